@@ -1,24 +1,7 @@
 /* Input files of Abaqus and CalculiX: right meshes and groups, refusals with the right line, no trust in numbers. */
-#include "harness.h"
+#include "mesh_text.h"
 #include "scene/mesh.h"
 #include "uzawa.h"
-
-static const uz_given_group *find_given(const uz_given_mesh *mesh, const char *name)
-{
-    for (int64_t i = 0; i < mesh->n_groups; i++)
-        if (strcmp(mesh->groups[i].name, name) == 0)
-            return &mesh->groups[i];
-    CHECK_MSG(false, "no group %s", name);
-    static const uz_given_group none;
-    return &none;
-}
-
-static void read_text(uz_given_mesh *mesh, const char *text)
-{
-    uz_error err = {0};
-    CHECK_MSG(uz_mesh_read(mesh, NULL, text, strlen(text), 0, &err) == UZ_OK, "line %lld: %s", (long long)err.line,
-              err.message);
-}
 
 /* Two bricks on each other, numbered with gaps and not in order, with everything that is read. */
 static const char BRICKS[] = "** made by hand\r\n"
@@ -124,12 +107,7 @@ TEST(nodes_amid_edges)
 #define NODES "*NODE\n1,0,0\n2,1,0\n3,0,1\n"
 #define TRI   NODES "*ELEMENT,TYPE=CPS3,ELSET=E\n7,1,2,3\n"
 
-static const struct {
-    const char *text;
-    uz_status status;
-    int64_t line;
-    const char *says;
-} REFUSALS[] = {
+static const mesh_refusal REFUSALS[] = {
     {"", UZ_ERR_FORMAT, 1, "begins with a keyword"},
     {"1, 2, 3\n", UZ_ERR_FORMAT, 1, "begins with a keyword"},
     {NODES, UZ_ERR_UNSUPPORTED, 4, "no element of a body"},
@@ -185,32 +163,12 @@ static const struct {
 
 TEST(refusals_say_where)
 {
-    for (size_t i = 0; i < sizeof REFUSALS / sizeof REFUSALS[0]; i++) {
-        uz_given_mesh mesh;
-        uz_error err = {0};
-        const uz_status status = uz_abaqus_read(&mesh, REFUSALS[i].text, strlen(REFUSALS[i].text), 0, &err);
-        CHECK_MSG(status == REFUSALS[i].status && err.line == REFUSALS[i].line, "refusal %zu: %s, line %lld: %s", i,
-                  uz_status_name(status), (long long)err.line, err.message);
-        CHECK_MSG(strstr(err.message, REFUSALS[i].says) != NULL, "refusal %zu: \"%s\"", i, err.message);
-        CHECK(!mesh.xyz && !mesh.groups);
-        uz_given_mesh_clear(&mesh);
-    }
+    check_refusals(uz_abaqus_read, REFUSALS, sizeof REFUSALS / sizeof REFUSALS[0]);
 }
 
-/* Whatever is cut off, the rest is read or refused. */
 TEST(every_beginning_of_a_file)
 {
-    for (size_t len = 0; len < sizeof BRICKS; len++) {
-        uz_given_mesh given;
-        uz_error err = {0};
-        char *part = malloc(len + 1); /* of its own length: a sanitizer sees what is read beyond it */
-        memcpy(part, BRICKS, len);
-        const uz_status status = uz_abaqus_read(&given, part, len, 0, &err);
-        CHECK_MSG(status == UZ_OK || ((status == UZ_ERR_FORMAT || status == UZ_ERR_UNSUPPORTED) && err.line > 0),
-                  "%zu bytes: %s", len, uz_status_name(status));
-        free(part);
-        uz_given_mesh_clear(&given);
-    }
+    check_beginnings(uz_abaqus_read, "two bricks", BRICKS, sizeof BRICKS);
 }
 
 /* Ranges and sets of sets that name far more than there is take no more memory than is allowed. */

@@ -1,6 +1,6 @@
 /* Gmsh files: right meshes in every version and form, right refusals with the right line, no trust in counts. */
 #include "gmsh_text.h"
-#include "harness.h"
+#include "mesh_text.h"
 #include "scene/mesh.h"
 #include "uzawa.h"
 
@@ -90,16 +90,6 @@ TEST(files_that_are_always_here)
 
 /* ---------------------------------------------------------------- one mesh in every form */
 
-static const uz_given_group *find_given(const uz_given_mesh *mesh, const char *name)
-{
-    for (int64_t i = 0; i < mesh->n_groups; i++)
-        if (strcmp(mesh->groups[i].name, name) == 0)
-            return &mesh->groups[i];
-    CHECK_MSG(false, "no group %s", name);
-    static const uz_given_group none;
-    return &none;
-}
-
 static void check_tetrahedron(const uz_given_mesh *mesh)
 {
     CHECK(mesh->dim == 3 && mesh->n_nodes == 11 && mesh->n_elements == 1 && mesh->kind[0] == UZ_TET10);
@@ -180,12 +170,7 @@ TEST(element_of_two_groups)
 #define TRI2 "$Elements\n1\n1 2 0 1 2 3\n$EndElements\n"
 #define TRI4 "$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
 
-static const struct {
-    const char *text;
-    uz_status status;
-    int64_t line;
-    const char *says;
-} REFUSALS[] = {
+static const mesh_refusal REFUSALS[] = {
     {"", UZ_ERR_FORMAT, 1, "begins with $MeshFormat"},
     {"$NOD\n1\n", UZ_ERR_FORMAT, 2, "version 1"},
     {"\n\nhello\n", UZ_ERR_FORMAT, 3, "a section such as $Nodes was expected, found \"hello\""},
@@ -237,15 +222,7 @@ static const struct {
 
 TEST(refusals_say_where)
 {
-    for (size_t i = 0; i < sizeof REFUSALS / sizeof REFUSALS[0]; i++) {
-        uz_given_mesh mesh;
-        uz_error err = {0};
-        const uz_status status = uz_gmsh_read(&mesh, REFUSALS[i].text, strlen(REFUSALS[i].text), 0, &err);
-        CHECK_MSG(status == REFUSALS[i].status && err.line == REFUSALS[i].line, "refusal %zu: %s, line %lld: %s", i,
-                  uz_status_name(status), (long long)err.line, err.message);
-        CHECK_MSG(strstr(err.message, REFUSALS[i].says) != NULL, "refusal %zu: \"%s\"", i, err.message);
-        uz_given_mesh_clear(&mesh);
-    }
+    check_refusals(uz_gmsh_read, REFUSALS, sizeof REFUSALS / sizeof REFUSALS[0]);
 }
 
 TEST(binary_refusals_say_the_byte)

@@ -1,20 +1,9 @@
 /* VTK files: right meshes and groups from all forms of arrays, refusals with the right line, no trust in lengths. */
-#include "harness.h"
-#include "io/mesh_reader.h"
+#include "mesh_text.h"
 #include "scene/mesh.h"
 #include "uzawa.h"
 
 #include <math.h>
-
-static const uz_given_group *find_given(const uz_given_mesh *mesh, const char *name)
-{
-    for (int64_t i = 0; i < mesh->n_groups; i++)
-        if (strcmp(mesh->groups[i].name, name) == 0)
-            return &mesh->groups[i];
-    CHECK_MSG(false, "no group %s", name);
-    static const uz_given_group none;
-    return &none;
-}
 
 enum { ROOM = 20000 };
 static size_t load(char text[ROOM], const char *name)
@@ -153,12 +142,7 @@ TEST(wedges_either_way)
     }
 }
 
-static const struct {
-    const char *text;
-    uz_status status;
-    int64_t line;
-    const char *says;
-} REFUSALS[] = {
+static const mesh_refusal REFUSALS[] = {
     {"", UZ_ERR_FORMAT, 1, "begins with"},
     {"# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\n", UZ_ERR_UNSUPPORTED, 4, "\"POLYDATA\""},
     {"# vtk DataFile Version 3.0\na\nTEXT\n", UZ_ERR_FORMAT, 3, "ASCII or BINARY"},
@@ -216,36 +200,14 @@ TEST(pixels_and_voxels)
 
 TEST(refusals_say_where)
 {
-    for (size_t i = 0; i < sizeof REFUSALS / sizeof REFUSALS[0]; i++) {
-        uz_given_mesh mesh;
-        uz_error err = {0};
-        const uz_status status = uz_vtk_read(&mesh, REFUSALS[i].text, strlen(REFUSALS[i].text), 0, &err);
-        CHECK_MSG(status == REFUSALS[i].status && err.line == REFUSALS[i].line, "refusal %zu: %s, line %lld: %s", i,
-                  uz_status_name(status), (long long)err.line, err.message);
-        CHECK_MSG(strstr(err.message, REFUSALS[i].says) != NULL, "refusal %zu: \"%s\"", i, err.message);
-        CHECK(!mesh.xyz && !mesh.groups);
-        uz_given_mesh_clear(&mesh);
-    }
+    check_refusals(uz_vtk_read, REFUSALS, sizeof REFUSALS / sizeof REFUSALS[0]);
 }
 
-/* Whatever is cut off, the rest is read or refused. */
 TEST(every_beginning_of_a_file)
 {
     static char text[ROOM];
-    for (int i = 0; i < N_FILES; i++) {
-        const size_t all = load(text, FILES[i]);
-        for (size_t len = 0; len < all; len++) {
-            uz_given_mesh given;
-            uz_error err = {0};
-            char *part = malloc(len + 1); /* of its own length: a sanitizer sees what is read beyond it */
-            memcpy(part, text, len);
-            const uz_status status = uz_vtk_read(&given, part, len, 0, &err);
-            CHECK_MSG(status == UZ_OK || ((status == UZ_ERR_FORMAT || status == UZ_ERR_UNSUPPORTED) && err.line > 0),
-                      "%s, %zu bytes: %s", FILES[i], len, uz_status_name(status));
-            free(part);
-            uz_given_mesh_clear(&given);
-        }
-    }
+    for (int i = 0; i < N_FILES; i++)
+        check_beginnings(uz_vtk_read, FILES[i], text, load(text, FILES[i]));
 }
 
 TEST(memory_is_bounded)
