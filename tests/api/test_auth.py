@@ -12,7 +12,6 @@ import signal
 import ssl
 import subprocess
 import tempfile
-import threading
 import time
 
 import service

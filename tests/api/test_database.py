@@ -11,7 +11,7 @@ import time
 
 import databases
 import service
-from service import ENDLESS, MATRICES, Service, Skip, check, expect, wait_until
+from service import ENDLESS, MATRICES, Service, Skip, check, wait_until
 
 SERVER = None  # one for all tests, made by the first
 

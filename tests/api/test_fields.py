@@ -1,7 +1,6 @@
 """What an answer means: fields that are computed when asked for, and the VTK file. usage: test_fields.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
-import io
 import math
 import os
 import tempfile

@@ -8,7 +8,6 @@ import re
 import signal
 import threading
 import time
-import urllib.parse
 
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, head_of, options

@@ -11,7 +11,7 @@ import time
 
 import databases
 import service
-from service import ENDLESS, MATRICES, PUSHED_OFF, SCENE, Service, check, expect
+from service import ENDLESS, MATRICES, PUSHED_OFF, SCENE, check, expect
 
 SERVER = None
 TOKENS = "ann submit ann-secret-is-long\nbob submit bob-secret-is-long\nroot admin root-secret-is-long\n"

@@ -11,7 +11,6 @@ SHARED = True  # one service for all tests
 
 WAIT = {"Prefer": "wait=60"}
 SVG = "{http://www.w3.org/2000/svg}"
-DECADES = [10.0 ** -k for k in range(1, 11)]
 
 
 def scene(error=1e-6, **solver):

@@ -5,7 +5,6 @@ What must hold of each: forces balance and are what equilibrium says; nothing pu
 scene has a symmetric answer; nodal pressures do not zigzag; the force is that of the refined mesh within the mesh's
 error, and where elements are bisected, and of press fits Lame's; exchanging sides changes nothing; turning, units and numbers change rounding only."""
 import http.client
-import itertools
 import json
 import math
 import pathlib

@@ -6,7 +6,6 @@ What claims to have converged must be in equilibrium: with elements and laws wri
 forces vanish on free dofs away from the contact; on it they press, and along the obstacle there are none. No point of a fine grid in any
 element is turned inside out, no node stands in the obstacle, supports are where they were put.
 Every eighth is asked mirrored as well, and answered by the mirror image. usage: generated_large.py BUILD_DIR OUTPUT.json [SCENES]"""
-import itertools
 import json
 import math
 import pathlib

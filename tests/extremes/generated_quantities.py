@@ -9,7 +9,6 @@ table in its place, a hill, a hollow, or flat, with teeth or without, of few pie
 import copy
 import random
 import statistics
-import sys
 
 import generated_contacts as contacts
 from two_bodies import body

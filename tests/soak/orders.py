@@ -3,7 +3,6 @@ it can and on one that keeps nothing. usage: orders.py BUILD_DIR [REQUESTS [SEED
 """
 import copy
 import json
-import os
 import pathlib
 import random
 import sys
