@@ -98,7 +98,7 @@ bool group_process_begin(group_process *g, const char *command, server_log *log)
 {
     char name[NAME], filled[COMMAND];
     int error = 0;
-    group_process_reap(g, true);
+    group_process_reap(g);
     const int fd = listen_at(name);
     if (fd < 0)
         error = errno;
@@ -155,12 +155,12 @@ void group_process_end(group_process *g)
         kill(-g->pid, SIGTERM);
 }
 
-void group_process_reap(group_process *g, bool patient)
+void group_process_reap(group_process *g)
 {
     const double until = clock_seconds(CLOCK_MONOTONIC) + PATIENT_S;
     int status;
     stop_listening(g);
-    while (patient && g->pid > 0 && !group_process_ended(g, &status) && clock_seconds(CLOCK_MONOTONIC) < until)
+    while (g->pid > 0 && !group_process_ended(g, &status) && clock_seconds(CLOCK_MONOTONIC) < until)
         nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
     if (g->pid <= 0 || group_process_ended(g, &status))
         return;

@@ -23,7 +23,7 @@ int group_process_accept(group_process *g);
 bool group_process_ended(group_process *g, int *status);
 /* It is to end, at once. */
 void group_process_end(group_process *g);
-/* Waits until it has, for a moment if `patient`, then kills what is left. */
-void group_process_reap(group_process *g, bool patient);
+/* Waits until it has, for a moment, then kills what is left. */
+void group_process_reap(group_process *g);
 
 #endif

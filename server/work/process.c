@@ -57,7 +57,7 @@ void process_free(process *p)
         process_reap(p, &out_of_memory);
     }
     group_process_end(&p->group);
-    group_process_reap(&p->group, true);
+    group_process_reap(&p->group);
     segment_close(&p->board_memory);
     segment_close(&p->inbox);
     segment_close(&p->outbox);

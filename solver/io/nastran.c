@@ -242,9 +242,9 @@ static uz_status read_real(double *value, const nastran *n, int64_t i)
 
 /* ---- entries */
 
-static uz_status check_systems(const nastran *n, int64_t cp, int64_t cd)
+static uz_status check_systems(const nastran *n)
 {
-    const char *system[] = {field_at(n, cp), field_at(n, cd)};
+    const char *system[] = {field_at(n, 1), field_at(n, 5)};
     for (int i = 0; i < 2; i++)
         if (system[i][strspn(system[i], "0")] && strcmp(system[i], "-1") != 0)
             return FAIL(n, UZ_ERR_UNSUPPORTED,
@@ -268,7 +268,7 @@ static uz_status read_grid(nastran *n)
     int64_t tag;
     uz_status status = read_int(&tag, n, 0, "the number of a node");
     if (status == UZ_OK)
-        status = check_systems(n, 1, 5);
+        status = check_systems(n);
     for (int i = 0; i < 3 && status == UZ_OK; i++)
         status = read_real(&x[i], n, 2 + i);
     if (status == UZ_OK)
@@ -374,7 +374,7 @@ static uz_status read_entry(nastran *n)
     if (strcmp(n->name, "GRID") == 0)
         return read_grid(n);
     if (strcmp(n->name, "GRDSET") == 0)
-        return check_systems(n, 1, 5);
+        return check_systems(n);
     if (strcmp(n->name, "SET3") == 0)
         return read_set(n);
     for (int i = 0; i < N_ELEMENTS; i++)

@@ -37,7 +37,7 @@ static uz_status read_vertex(obj_file *file)
     if (file->in->max_bytes > 0 && sizeof *file->xyz * 3 * (size_t)(file->n + 1) > file->in->max_bytes)
         return uz_fail_line(file->in->err, UZ_ERR_LIMIT, file->text.number,
                             "the surface takes more memory than allowed");
-    const uz_status status = triangles_reals(file->xyz + 3 * file->n, 3, &file->text, "a vertex", file->in->err);
+    const uz_status status = triangles_reals(file->xyz + 3 * file->n, &file->text, "a vertex", file->in->err);
     file->n += status == UZ_OK;
     return status;
 }

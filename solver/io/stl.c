@@ -120,14 +120,14 @@ static uz_status read_facet(triangles_in *in, normals *seen, triangles_text *tex
     if (triangles_word(&word, &len, text)) { /* some writers leave it out, others write what is no number */
         if (!triangles_is(word, len, "normal"))
             return uz_fail_line(in->err, UZ_ERR_FORMAT, line, "\"facet normal\" and three numbers were expected");
-        if (triangles_reals(normal, 3, text, "a normal", NULL) != UZ_OK)
+        if (triangles_reals(normal, text, "a normal", NULL) != UZ_OK)
             memset(normal, 0, sizeof normal);
     }
     status = expect(text, "outer", in->err); /* "outer loop" */
     for (int k = 0; k < 3 && status == UZ_OK; k++) {
         status = expect(text, "vertex", in->err);
         if (status == UZ_OK)
-            status = triangles_reals(corner[k], 3, text, "a vertex", in->err);
+            status = triangles_reals(corner[k], text, "a vertex", in->err);
     }
     if (status == UZ_OK)
         status = expect(text, "endloop", in->err);

@@ -92,13 +92,13 @@ bool triangles_is(const char *word, size_t len, const char *what)
     return i == len && !what[i];
 }
 
-uz_status triangles_reals(double *x, int count, triangles_text *text, const char *what, uz_error *err)
+uz_status triangles_reals(double x[3], triangles_text *text, const char *what, uz_error *err)
 {
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < 3; k++) {
         const char *word;
         size_t len;
         if (!triangles_word(&word, &len, text))
-            return uz_fail_line(err, UZ_ERR_FORMAT, text->number, "%s has %d numbers, not %d", what, count, k);
+            return uz_fail_line(err, UZ_ERR_FORMAT, text->number, "%s has 3 numbers, not %d", what, k);
         if (uz_parse_double(&x[k], word, len) != len) {
             char shown[25];
             size_t used = 0;

@@ -26,8 +26,8 @@ bool triangles_next_line(triangles_text *text);
 /* The next word of the line; false: there is none. */
 bool triangles_word(const char **word, size_t *len, triangles_text *text);
 bool triangles_is(const char *word, size_t len, const char *what);
-/* So many numbers from the line; what: "a vertex", for messages. UZ_ERR_FORMAT, _NOT_FINITE. */
-uz_status triangles_reals(double *x, int count, triangles_text *text, const char *what, uz_error *err);
+/* Three numbers from the line; what: "a vertex", for messages. UZ_ERR_FORMAT, _NOT_FINITE. */
+uz_status triangles_reals(double x[3], triangles_text *text, const char *what, uz_error *err);
 
 /* Rows of the table. */
 bool triangles_stl_recognises(const char *text, size_t len);

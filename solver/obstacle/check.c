@@ -42,12 +42,12 @@ uz_status uz_obstacle_check_direction(const uz_obstacle_subject *s, const char *
     return status;
 }
 
-uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, int64_t least, const char *key, const char *what)
+uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, const char *key, const char *what)
 {
     char where[UZ_OBSTACLE_POINTER];
     const uz_contact *c = s->contact;
     const bool heights = c->kind == UZ_OBSTACLE_HEIGHT, two = heights && s->dim == 3;
-    if (c->n_x < least || (two && c->n_y < least))
+    if (c->n_x < 2 || (two && c->n_y < 2))
         return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, -1), "%s", what);
     if (!c->x || ((two || !heights) && !c->y) || (heights && !c->z))
         return uz_fail(s->err, UZ_ERR_ARGUMENT, uz_obstacle_pointer(where, s, "", -1),

@@ -18,7 +18,7 @@ uz_status uz_obstacle_not_finite(const uz_obstacle_subject *s, const char *key, 
 uz_status uz_obstacle_check_finite(const uz_obstacle_subject *s, const char *key, const double *v, int64_t n);
 /* The contact's normal; remedy: what is said of one without a direction. */
 uz_status uz_obstacle_check_direction(const uz_obstacle_subject *s, const char *key, const char *remedy);
-/* Are there `least` numbers in each list, and the lists themselves? */
-uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, int64_t least, const char *key, const char *what);
+/* Are there two numbers at least in each list, and the lists themselves? */
+uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, const char *key, const char *what);
 
 #endif

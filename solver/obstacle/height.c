@@ -50,7 +50,7 @@ static uz_status check(const uz_obstacle_subject *s)
     if (s->dim == 3 && c->n_y == 0)
         return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "", -1),
                        "heights of a solid model need y, too");
-    status = uz_obstacle_check_lists(s, 2, s->dim == 2 || c->n_x < 2 ? "x" : "y", "a table needs two places at least");
+    status = uz_obstacle_check_lists(s, s->dim == 2 || c->n_x < 2 ? "x" : "y", "a table needs two places at least");
     if (status == UZ_OK)
         status = check_ascending(s, "x", c->x, c->n_x);
     if (status == UZ_OK && s->dim == 3)

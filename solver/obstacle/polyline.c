@@ -11,7 +11,7 @@ static uz_status check(const uz_obstacle_subject *s)
 {
     char where[UZ_OBSTACLE_POINTER];
     const uz_contact *c = s->contact;
-    const uz_status status = uz_obstacle_check_lists(s, 2, "points", "a polyline needs two points at least");
+    const uz_status status = uz_obstacle_check_lists(s, "points", "a polyline needs two points at least");
     if (status != UZ_OK)
         return status;
     for (int64_t i = 0; i < c->n_x; i++) {

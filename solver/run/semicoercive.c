@@ -196,7 +196,7 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     if (setup) {
         for (int64_t j = 0; j < s->d; j++)
             sum += noise[j] > 0.0 ? noise[j] / augmented.qp.K.val[augmented.qp.K.ptr[j]] * noise[j] : 0.0;
-        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, &augmented.qp.K, NULL) * sum : 0.0;
+        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, &augmented.qp.K) * sum : 0.0;
     }
     *bound = sqrt(rows);
     uz_setup_release(s->cache, setup);
@@ -235,7 +235,7 @@ static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *re
         for (int64_t j = 0; status == UZ_OK && j < s->d; j++)
             most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
         if (status == UZ_OK)
-            claim.inverse_bound = most * uz_setup_inverse_bound(setup, K, NULL);
+            claim.inverse_bound = most * uz_setup_inverse_bound(setup, K);
         uz_setup_release(s->cache, setup);
         uz_augmented_clear(&problem);
         if (status == UZ_OK)

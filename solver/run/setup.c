@@ -285,12 +285,12 @@ uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const 
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
-double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, const uz_stop *stop)
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K)
 {
     const double bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY;
     double doubt = uz_bound_doubt(bound, K->cols);
     uz_error ignored = {0};
-    if (isfinite(bound) && doubt > UZ_BOUND_HARMLESS && uz_setup_doubt(setup, &doubt, K, stop, &ignored) != UZ_OK)
+    if (isfinite(bound) && doubt > UZ_BOUND_HARMLESS && uz_setup_doubt(setup, &doubt, K, NULL, &ignored) != UZ_OK)
         doubt = INFINITY;
     return doubt < 1.0 ? bound / (1.0 - doubt) : INFINITY;
 }

@@ -64,8 +64,8 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
 void uz_setup_free(uz_setup *setup);
 
 /* The factor's bound on its inverse as one on that of K: e'K^-1 e is at most so many times the sum of e_j^2 / K_jj.
- * INFINITY: unknown, as the factor can't be trusted; also where it had to stop (stop NULL: never). */
-double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, const uz_stop *stop);
+ * INFINITY: unknown, as the factor can't be trusted. */
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K);
 /* How far its factor may be trusted: uz_distrust, made at the first call and kept with the setup. Only certificates of
  * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
 uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, const uz_stop *stop, uz_error *err);

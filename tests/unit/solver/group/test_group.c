@@ -384,7 +384,7 @@ static void check_program(const char *command)
     uz_process_group *group = uz_process_group_new(stream);
     check_small_systems(group, MUST_CONVERGE);
     uz_process_group_free(group);
-    group_process_reap(&process, true);
+    group_process_reap(&process);
 }
 
 TEST(small_systems_by_processes)
