@@ -161,10 +161,23 @@ TEST(element_of_two_groups)
     uz_given_mesh_clear(&mesh);
 }
 
+TEST(numbers_with_wide_gaps)
+{
+    static const char text[] = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+                               "$Nodes\n4\n9000000 0 0 0\n7 5 5 0\n123456789012 0 1 0\n8 1 0 0\n$EndNodes\n"
+                               "$Elements\n1\n1 2 0 9000000 8 123456789012\n$EndElements";
+    uz_given_mesh mesh;
+    uz_error err = {0};
+    CHECK_MSG(uz_gmsh_read(&mesh, text, sizeof text - 1, 0, &err) == UZ_OK, "%s", err.message);
+    CHECK(mesh.n_elements == 1 && mesh.node[0] == 0 && mesh.node[1] == 3 && mesh.node[2] == 2);
+    uz_given_mesh_clear(&mesh);
+}
+
 /* ---------------------------------------------------------------- refusals */
 
 #define H2   "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
 #define H4   "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+#define FAR  "$Nodes\n3\n9000000 0 0 0\n7 1 0 0\n"
 #define N2   "$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n"
 #define N4   "$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n"
 #define TRI2 "$Elements\n1\n1 2 0 1 2 3\n$EndElements\n"
@@ -194,6 +207,8 @@ static const mesh_refusal REFUSALS[] = {
     {H2 "$Nodes\n2\n1 0 0 0\n-2 1 0 0\n$EndNodes\n", UZ_ERR_FORMAT, 7, "the number -2"},
     {H2 "$Nodes\n1\n1 0 0 0\n2 1 0 0\n$EndNodes\n", UZ_ERR_FORMAT, 7, "$EndNodes was expected, found \"2\""},
     {H2 N2 "$Elements\n1\n1 2 0 1 2 4\n$EndElements\n", UZ_ERR_FORMAT, 12, "has node 4, which $Nodes has not"},
+    {H2 FAR "8 0 1 0\n$EndNodes\n$Elements\n1\n1 2 0 7 8 9\n", UZ_ERR_FORMAT, 12, "has node 9, which $Nodes has not"},
+    {H2 FAR "7 0 1 0\n$EndNodes\n", UZ_ERR_FORMAT, 8, "two nodes with the number 7"},
     {H2 N2 "$Elements\n1\n1 10 0 1 2 3\n", UZ_ERR_UNSUPPORTED, 12, "Mesh.SecondOrderIncomplete = 1"},
     {H2 N2 "$Elements\n1\n1 7 0 1 2 3\n", UZ_ERR_UNSUPPORTED, 12, "5-node pyramid"},
     {H2 N2 "$Elements\n1\n1 19 0 1 2 3\n", UZ_ERR_UNSUPPORTED, 12, "tetrahedra, hexahedra or wedges"},
