@@ -25,6 +25,15 @@ static struct {
     int live;
 } heap;
 
+/* Watches from now on: `allowed` allocations succeed, and the next one fails. */
+static void heap_watch(long allowed)
+{
+    heap.live = 0;
+    heap.failed = false;
+    heap.until_failure = allowed;
+    heap.watching = true;
+}
+
 static bool fails_now(void)
 {
     if (!heap.watching || heap.until_failure < 0 || heap.failed)

@@ -44,10 +44,7 @@ static void fail_each(int jobs)
     long n = 0;
     for (; !done && n < 10000; n++) {
         client_bodies bodies;
-        heap.live = 0;
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         client_exit code = client_build(&s, &bodies);
         done = !heap.failed;
         CHECK_MSG(code == CLIENT_OK ? same(&bodies, &whole) : code == CLIENT_LOCAL, "allocation %ld: exit %d", n, code);

@@ -41,10 +41,7 @@ TEST(checks_and_reports)
     bool done = false;
     long n = 0;
     for (; !done && n < 1000; n++) {
-        heap.live = 0;
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         const bool added = try_all(job, answer);
         done = !heap.failed;
         heap.watching = false;

@@ -22,10 +22,7 @@ static void fail_each(attempt run, int fewest)
     int allowed = 0;
     bool done = false;
     for (; allowed < MOST && !done; allowed++) {
-        heap.live = 0;
-        heap.failed = false;
-        heap.until_failure = allowed;
-        heap.watching = true;
+        heap_watch(allowed);
         bool well = run();
         heap.watching = false;
         CHECK_MSG(heap.live == 0, "%d blocks left after %d allocations", heap.live, allowed);

@@ -29,10 +29,7 @@ TEST(failures_are_told_and_leave_nothing)
     for (; status != UZ_OK && count < 20000; count = next_allocation(count)) {
         uz_body_model model;
         uz_error err = {0};
-        heap.live = 0;
-        heap.failed = false;
-        heap.until_failure = count;
-        heap.watching = true;
+        heap_watch(count);
         status = uz_body_model_build(&model, &s, UZ_BODY_SUPPORTED, &err);
         uz_body_model_clear(&model);
         heap.watching = false;

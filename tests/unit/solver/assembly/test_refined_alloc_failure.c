@@ -170,10 +170,7 @@ TEST(allocations)
         uz_error err = {0};
         uz_mesh mesh;
         CHECK_INT(uz_mesh_from_scene(&mesh, &s, &err), UZ_OK);
-        heap.live = 0;
-        heap.failed = false;
-        heap.until_failure = k;
-        heap.watching = true;
+        heap_watch(k);
         const uz_status status = uz_smooth_refined(&mesh, &s, &err);
         heap.watching = false;
         CHECK_MSG(heap.live == 0, "%d blocks leaked where allocation %ld fails", heap.live, k);

@@ -33,10 +33,7 @@ static void fail_each(bool solid)
         uz_csc wide = {0};
         bool known = false;
         uz_error err = {0};
-        heap.live = 0;
-        heap.failed = false;
-        heap.until_failure = count;
-        heap.watching = true;
+        heap_watch(count);
         status = uz_row_turn_find(&turn, &base, &at, &s, r, 0, NULL, &err);
         if (status == UZ_OK)
             status = uz_widen_by_rows(&wide, &base.K, &at.N, r, 0, &turn, &err);

@@ -15,10 +15,7 @@ typedef uz_status (*operation)(uz_error *err);
 static bool ends_well(const char *name, operation run, int allowed)
 {
     uz_error err = {0};
-    heap.live = 0;
-    heap.failed = false;
-    heap.until_failure = allowed;
-    heap.watching = true;
+    heap_watch(allowed);
     uz_status status = run(&err);
     heap.watching = false;
     CHECK_MSG(heap.live == 0, "%s: %d blocks leaked after %d allocations", name, heap.live, allowed);

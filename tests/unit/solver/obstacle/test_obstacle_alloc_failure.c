@@ -9,10 +9,7 @@
 
 static bool fails_at(long n, void (*run)(void))
 {
-    heap.live = 0;
-    heap.until_failure = n;
-    heap.failed = false;
-    heap.watching = true;
+    heap_watch(n);
     run();
     heap.watching = false;
     CHECK_MSG(heap.live == 0, "allocation %ld fails and %d blocks leak", n, heap.live);

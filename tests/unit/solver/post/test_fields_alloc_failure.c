@@ -79,10 +79,7 @@ static uz_status picture(const uz_scene *scene, const uz_field_source *answer, u
 static bool fail_at(attempt run, const uz_scene *scene, const uz_field_source *answer, long n)
 {
     uz_error err = {0};
-    heap.live = 0;
-    heap.until_failure = n;
-    heap.failed = false;
-    heap.watching = true;
+    heap_watch(n);
     const uz_status status = run(scene, answer, &err);
     heap.watching = false;
     CHECK_MSG(status == (heap.failed ? UZ_ERR_MEMORY : UZ_OK), "allocation %ld: %s", n, err.message);
@@ -105,10 +102,7 @@ static bool evaluate_at(const uz_scene *scene, const uz_body_model *model, const
     uz_error err = {0};
     uz_result again = {
         .m = answer->m, .n_nodes = answer->n_nodes, .u = answer->u, .r = answer->r, .mesh = answer->mesh};
-    heap.live = 0;
-    heap.until_failure = n;
-    heap.failed = false;
-    heap.watching = true;
+    heap_watch(n);
     const uz_status status = uz_evaluate(&again, model, scene, NULL, &err);
     free(again.pressure);
     uz_evaluation_free(again.evaluation);
@@ -171,10 +165,7 @@ TEST(every_allocation_of_a_solid_may_fail)
     uz_surface out;
     uz_error err = {0};
     for (long n = 0;; n++) {
-        heap.live = 0;
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         const uz_status status = uz_surface_compute(&out, &s, &answer, EVERYTHING, 0, NULL, &err);
         uz_surface_clear(&out);
         heap.watching = false;

@@ -84,10 +84,7 @@ static long fail_each(const scenario *s)
 {
     const long step = s->step > 0 ? s->step : 1;
     for (long n = 0; n<MOST_ALLOCATIONS; n = step> 1 ? n + step : next_allocation(n)) {
-        heap.live = 0;
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         attempt(s, n);
         heap.watching = false;
         CHECK_MSG(heap.live == 0, "%s: allocation %ld fails and %d blocks leak", s->name, n, heap.live);
@@ -429,14 +426,6 @@ static void attempt_verification(const uz_problem *problem, const uz_settings *s
     uz_result_free(result);
 }
 
-static void begin_watching(long n)
-{
-    heap.live = 0;
-    heap.until_failure = n;
-    heap.failed = false;
-    heap.watching = true;
-}
-
 /* True when an allocation failed, so that there may be more. */
 static bool end_watching(const char *name, long n)
 {
@@ -463,7 +452,7 @@ static void check_cases(uz_operator op, uz_method method, int64_t count)
     for (int64_t i = 1; i < count; i += 2)
         starts[i] = earlier->state;
     for (bool more = true; more && n < MOST_ALLOCATIONS; n = next_allocation(n)) {
-        begin_watching(n);
+        heap_watch(n);
         attempt_cases(&problem, &settings, starts, n);
         more = end_watching("cases", n);
     }
@@ -488,7 +477,7 @@ TEST(verification)
     CHECK_INT(uz_solve(&answer, &problem, &settings, NULL, NULL, NULL), UZ_OK);
     settings.relative_error = 1e-6;
     for (bool more = true; more && n < MOST_ALLOCATIONS; n = next_allocation(n)) {
-        begin_watching(n);
+        heap_watch(n);
         attempt_verification(&problem, &settings, answer, n);
         more = end_watching("verification", n);
     }

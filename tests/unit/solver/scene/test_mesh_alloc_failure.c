@@ -12,10 +12,7 @@ static long fail_each(uz_status (*run)(uz_error *err))
 {
     for (long n = 0; n < 1000; n++) {
         uz_error err = {0};
-        heap.live = 0;
-        heap.failed = false;
-        heap.until_failure = n;
-        heap.watching = true;
+        heap_watch(n);
         const uz_status status = run(&err);
         heap.watching = false;
         CHECK_MSG(heap.live == 0, "%d blocks leaked where allocation %ld fails", heap.live, n);

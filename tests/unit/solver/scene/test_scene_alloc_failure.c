@@ -13,10 +13,7 @@ static long fail_each(attempt run, const uz_scene *scene)
 {
     for (long n = 0; n < 1000; n++) {
         uz_error err = {0};
-        heap.live = 0;
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         const uz_status status = run(scene, &err);
         heap.watching = false;
         CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
@@ -238,9 +235,7 @@ TEST(error_estimate_without_memory_is_nan)
     uz_body_model model = build_body(&scene);
     double *u = solve_linear(&model, &scene);
     for (long n = 0; n < 2; n++) {
-        heap.until_failure = n;
-        heap.failed = false;
-        heap.watching = true;
+        heap_watch(n);
         CHECK(isnan(uz_estimate_mesh_error(NULL, NULL, &model, NULL, u)));
         heap.watching = false;
     }
