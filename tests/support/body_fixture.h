@@ -103,18 +103,24 @@ static inline uz_body_model body_model(const uz_scene *scene)
     return model;
 }
 
-/* A certified answer, or the end of the program. */
-static inline uz_result *body_solve(const uz_scene *scene, double accuracy)
+/* An answer, or the end of the program. */
+static inline uz_result *body_solve_to(const uz_scene *scene, double accuracy)
 {
     const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *scene};
     uz_settings settings = uz_settings_default();
     uz_result *result = NULL;
     uz_error err = {0};
     settings.relative_error = accuracy;
-    uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
-    CHECK_MSG(status == UZ_OK, "%s: %s", err.where, err.message);
+    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
     if (!result)
         exit(1);
+    return result;
+}
+
+/* A certified one. */
+static inline uz_result *body_solve(const uz_scene *scene, double accuracy)
+{
+    uz_result *result = body_solve_to(scene, accuracy);
     CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s %s",
               uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome), result->summary.message);
     return result;

@@ -25,14 +25,7 @@ static void press(uz_scene *s, const char *on, double value)
 
 static uz_result *solve(const uz_scene *s)
 {
-    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
-    const uz_settings settings = uz_settings_default();
-    uz_result *result = NULL;
-    uz_error err = {0};
-    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
-    if (!result)
-        exit(1);
-    CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s", result->summary.message);
+    uz_result *result = body_solve(s, 1e-8);
     CHECK(result->evaluation->imbalance < 1e-8 && isnan(result->evaluation->potential_energy));
     return result;
 }

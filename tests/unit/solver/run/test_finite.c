@@ -17,14 +17,7 @@ static uz_scene block(const char *element, double length, double height, int64_t
 
 static uz_result *solve(const uz_scene *s)
 {
-    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
-    const uz_settings settings = uz_settings_default();
-    uz_result *result = NULL;
-    uz_error err = {0};
-    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
-    if (!result)
-        exit(1);
-    return result;
+    return body_solve_to(s, 1e-8);
 }
 
 static void give_back(uz_result *result, uz_scene *s)

@@ -4,19 +4,6 @@
 #include "random_pairs.h"
 #include "sanitized.h"
 
-static uz_result *solve_to(const uz_scene *s, double error)
-{
-    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
-    uz_settings settings = uz_settings_default();
-    uz_result *result = NULL;
-    uz_error err = {0};
-    settings.relative_error = error;
-    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
-    if (!result)
-        exit(1);
-    return result;
-}
-
 static void give_back(uz_result *result, uz_scene *s)
 {
     uz_result_free(result);
@@ -58,7 +45,7 @@ TEST(stacked_blocks_pass_the_patch_test)
             body_hold(&s, "bleft", 0, NAN, NAN);
             body_hold(&s, "btop", NAN, -0.3, NAN);
             touch(&s, k % 2 ? "atop" : "bbottom", k % 2 ? "bbottom" : "atop");
-            uz_result *r = solve_to(&s, 1e-9);
+            uz_result *r = body_solve_to(&s, 1e-9);
             check_converged(r, 1, 30); /* the corners of both are on the verge of each other's ends */
             CHECK_MSG(fabs(r->evaluation->supports[0].force[1] - FORCE[law - 1]) < 1e-8, "%.9g",
                       r->evaluation->supports[0].force[1]);
@@ -101,7 +88,7 @@ TEST(two_tubes_are_one)
             rod->radius = 1.5;
         }
         touch(&s, k == 1 ? "bleft" : "aright", k == 1 ? "aright" : "bleft");
-        uz_result *r = solve_to(&s, 1e-8);
+        uz_result *r = body_solve_to(&s, 1e-8);
         check_converged(r, 1, 7);
         CHECK_MSG(ring || fabs(r->summary.max_pressure / PRESSURE - 1) < 1e-6, "%.8g", r->summary.max_pressure);
         CHECK_MSG(fabs(2 + moved_by(r, 2, 0)[0] - OUTER) < 1e-7, "%.9g", 2 + moved_by(r, 2, 0)[0]);
@@ -131,7 +118,7 @@ TEST(a_block_that_slides_over_another_is_mirrored)
         uz_result *r[2];
         for (int i = 0; i < 2; i++) {
             s[i] = slid(ELEMENTS[k], 4, 2 * i, k == 1);
-            r[i] = solve_to(&s[i], 1e-10);
+            r[i] = body_solve_to(&s[i], 1e-10);
             check_converged(r[i], 1, 8);
         }
         const double *here = r[0]->evaluation->supports[0].force, *there = r[1]->evaluation->supports[0].force;
@@ -158,7 +145,7 @@ TEST(stacked_bricks_pass_the_patch_test)
             body_hold(&s, held[i], i < 2 ? 0 : NAN, NAN, i < 2 ? NAN : 0);
         body_hold(&s, "abottom", NAN, 0, NAN);
         body_hold(&s, "btop", NAN, STRETCH - 1, NAN);
-        uz_result *r = solve_to(&s, 1e-9);
+        uz_result *r = body_solve_to(&s, 1e-9);
         check_converged(r, 1, 6);
         /* across there is no stress: mu (c^2 - 1) + lambda ln(c^2 STRETCH) = 0 */
         const double mu = 1 / 2.6, lambda = 0.3 / (1.3 * 0.4);
@@ -195,7 +182,7 @@ TEST(a_brick_that_slides_over_another_is_mirrored)
             s[i] = solid_pair(&a, &b, UZ_ELASTIC_NEO_HOOKE, NULL, k == 1);
             body_hold(&s[i], "abottom", 0, 0, 0);
             body_hold(&s[i], "btop", 1.2 * i, -0.15, 0);
-            r[i] = solve_to(&s[i], 1e-10);
+            r[i] = body_solve_to(&s[i], 1e-10);
             check_converged(r[i], 1, 7);
         }
         const double *here = r[0]->evaluation->supports[0].force, *there = r[1]->evaluation->supports[0].force;
@@ -243,7 +230,7 @@ TEST(rings_that_are_pressed_and_slide)
         body_hold(&s, "bbottom", i - 1, -0.6, NAN);
         body_hold(&s, "btop", i - 1, -0.6, NAN);
         touch(&s, "bright", "aright");
-        uz_result *r = solve_to(&s, 1e-8);
+        uz_result *r = body_solve_to(&s, 1e-8);
         check_converged(r, 1, 7);
         const uz_resultant *foot = r->evaluation->supports;
         const double force[2] = {foot[0].force[0] + foot[1].force[0], foot[0].force[1] + foot[1].force[1]};
@@ -314,7 +301,7 @@ TEST(reactions_of_a_large_step_do_not_cut_the_load_in_parts)
     for (size_t i = 0; i < sizeof SEED / sizeof *SEED; i++) {
         qp_random rng = {(uint64_t)SEED[i]};
         uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
-        uz_result *r = solve_to(&s, 1e-8);
+        uz_result *r = body_solve_to(&s, 1e-8);
         check_converged(r, 1, 15);
         CHECK_MSG(r->summary.finite.failed == 0, "seed %d: %lld parts failed", SEED[i],
                   (long long)r->summary.finite.failed);
@@ -330,7 +317,7 @@ TEST(corners_of_both_bodies_take_few_contact_problems)
     for (size_t i = 0; i < sizeof SEED / sizeof *SEED; i += (size_t)step_of_cases()) {
         qp_random rng = {(uint64_t)SEED[i]};
         uz_scene s = random_pair(&rng, (SEED[i] - 1) % 4 == 3);
-        uz_result *r = solve_to(&s, 1e-8);
+        uz_result *r = body_solve_to(&s, 1e-8);
         check_converged(r, 2, 25);
         give_back(r, &s);
     }
@@ -363,7 +350,7 @@ TEST(no_thin_body_goes_through_another)
     for (int k = 0; k < SCENES; k += step_of_cases()) {
         qp_random rng = {(uint64_t)k + 1};
         uz_scene s = led_through(&rng, k % 4 == 3, k % 2);
-        uz_result *r = solve_to(&s, 1e-6);
+        uz_result *r = body_solve_to(&s, 1e-6);
         CHECK_MSG(r->summary.outcome != UZ_CONVERGED, "scene %d", k);
         give_back(r, &s);
     }

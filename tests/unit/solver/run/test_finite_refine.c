@@ -20,15 +20,7 @@ static uz_scene block(uz_model model, const char *element, const double size[3],
 
 static uz_result *solve(const uz_scene *s, double error)
 {
-    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *s};
-    uz_settings settings = uz_settings_default();
-    uz_result *result = NULL;
-    uz_error err = {0};
-    settings.relative_error = error;
-    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s: %s", err.where, err.message);
-    if (!result)
-        exit(1);
-    return result;
+    return body_solve_to(s, error);
 }
 
 static void give_back(uz_result *result, uz_scene *s)
