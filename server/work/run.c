@@ -263,6 +263,14 @@ static run_end judge_end(run *r, watch_end end, const watch_report *seen)
     return END_FINISH;
 }
 
+/* The process of which others read how far the job is; NULL: none. */
+static void set_process(worker *me, process *p)
+{
+    pthread_mutex_lock(&me->lock);
+    me->process = p;
+    pthread_mutex_unlock(&me->lock);
+}
+
 void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
     static const char *const EVENTS[] = {
@@ -276,9 +284,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
               (log_field[]){LOG_S("job", claimed->id), LOG_I("attempt", claimed->attempts), {0}});
     uint64_t key = me->lease.held_body;
     process *p = work_take_process(w, me->lane, body, body_len, &key);
-    pthread_mutex_lock(&me->lock);
-    me->process = p;
-    pthread_mutex_unlock(&me->lock);
+    set_process(me, p);
     const watch_end end = watch_job(me, claimed, body, body_len, r.queue_s, &seen);
     if (end == WATCH_DONE && seen.done.u.done.start_lost)
         log_store_failure(&r, LOG_WARN, "start_not_read");
@@ -296,9 +302,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     } else if (store_outcome_of(&r)) {
         count_job(&r);
     }
-    pthread_mutex_lock(&me->lock);
-    me->process = NULL;
-    pthread_mutex_unlock(&me->lock);
+    set_process(me, NULL);
     parcel_clear(&r.parcel);
     free(r.error);
     free(r.rows);
@@ -327,9 +331,7 @@ bool work_probe(worker *me)
     atomic_store(&me->cancel, false); /* what was wanted of the job before; nobody knows of this one */
     atomic_store(&me->lost, false);
     process *p = work_take_process(me->w, me->lane, NULL, 0, &key);
-    pthread_mutex_lock(&me->lock);
-    me->process = p;
-    pthread_mutex_unlock(&me->lock);
+    set_process(me, p);
     const watch_end end = watch_job(me, &probe, body, sizeof PROBE - 1, 0.0, &seen);
     const bool done = end == WATCH_DONE && judge_end(&r, end, &seen) == END_FINISH && r.outcome.whole.summary;
     json_tree summary = {.root = NULL};
@@ -337,9 +339,7 @@ bool work_probe(worker *me)
                       strcmp(codec_summary_text(summary.root, "outcome"), "converged") == 0 &&
                       quantity_read(&force, summary.root, "contact.reaction_sum") && fabs(force + 1.0) < 1e-6;
     json_clear(&summary);
-    pthread_mutex_lock(&me->lock);
-    me->process = NULL;
-    pthread_mutex_unlock(&me->lock);
+    set_process(me, NULL);
     parcel_clear(&r.parcel);
     work_give_process(me->w, p, end == WATCH_DONE ? &seen.done : NULL, 0);
     return good;
