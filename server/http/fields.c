@@ -172,9 +172,9 @@ bool fields_parse(field_list *out, const char *text, unsigned otherwise, unsigne
                 used += (size_t)snprintf(names + used, sizeof names - used, ", %s", name);
         }
         if (!known)
-            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                                "\"%.*s\" is no field of a result: fields is a list of %s, separated by commas",
-                                (int)(len < 60 ? len : 60), text, names);
+            return REFUSE_PARAMETER(problem,
+                                    "\"%.*s\" is no field of a result: fields is a list of %s, separated by commas",
+                                    (int)(len < 60 ? len : 60), text, names);
         text = text[len] ? text + len + 1 : NULL;
     }
     return true;

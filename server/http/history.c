@@ -162,8 +162,7 @@ static bool read_choice(const http_request *rq, const char *key, const char *con
         }
         snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", words[i]);
     }
-    return !text || problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                                 "%s is one of %s, not \"%.60s\"", key, list, text);
+    return !text || REFUSE_PARAMETER(problem, "%s is one of %s, not \"%.60s\"", key, list, text);
 }
 
 bool plot_read(uz_plot *out, const http_request *rq, problem_details *problem)

@@ -285,11 +285,6 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
 
 /* -------------------------------------------------------------------- list */
 
-static bool refuse_query(problem_details *problem, const char *text)
-{
-    return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", "%s", text);
-}
-
 /* ---- times */
 
 /* A time of RFC 3339, "2026-01-31T12:00:00.5Z", as Unix seconds. */
@@ -339,7 +334,7 @@ static bool read_time(const http_request *rq, const char *key, double *out, prob
         return true;
     }
     snprintf(text, sizeof text, "%s must be a time of RFC 3339 such as 2026-01-31T12:00:00Z", key);
-    return refuse_query(problem, text);
+    return REFUSE_PARAMETER(problem, "%s", text);
 }
 
 /* ---- the query */
@@ -358,11 +353,11 @@ static bool read_query(const http_request *rq, store_query *query, char name[LON
     while (status && query->status <= JOB_DISMISSED && strcmp(job_status_name(query->status), status) != 0)
         query->status++;
     if (query->status > JOB_DISMISSED)
-        return refuse_query(problem, "status must be accepted, running, successful, failed or dismissed");
+        return REFUSE_PARAMETER(problem, "status must be accepted, running, successful, failed or dismissed");
     if (query->before && !(strlen(query->before) == 32 && strspn(query->before, "0123456789abcdef") == 32))
-        return refuse_query(problem, "cursor must be the \"next\" of an earlier page");
+        return REFUSE_PARAMETER(problem, "cursor must be the \"next\" of an earlier page");
     if (order && !query->ascending && strcmp(order, "desc") != 0)
-        return refuse_query(problem, "order must be desc (newest first) or asc");
+        return REFUSE_PARAMETER(problem, "order must be desc (newest first) or asc");
     if (!request_integer(rq, "limit", 1, 1000, &limit, problem))
         return false;
     query->limit = (int)limit;
@@ -374,9 +369,9 @@ static bool read_query(const http_request *rq, store_query *query, char name[LON
         if (!named && strcmp(key, "tag") != 0)
             continue;
         if (count > STORE_MORE_TAGS)
-            return refuse_query(problem, "at most 4 tags may be asked for, a name among them");
+            return REFUSE_PARAMETER(problem, "at most 4 tags may be asked for, a name among them");
         if (named && snprintf(name, LONGEST_NAME, CODEC_NAME_TAG "%s", value) >= LONGEST_NAME)
-            return refuse_query(problem, "name must be that of a job, of at most 63 bytes");
+            return REFUSE_PARAMETER(problem, "name must be that of a job, of at most 63 bytes");
         *(count == 0 ? &query->tag : &query->more[count - 1]) = named ? name : value;
         count++;
     }

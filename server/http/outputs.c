@@ -75,13 +75,12 @@ static uz_status write_picture(char **file, size_t *len, const output_source *of
 /* From where a solid is seen, and what of it is upwards. */
 static bool read_view(uz_picture *to, const http_request *rq, problem_details *problem)
 {
-    static const char TITLE[] = "A query parameter has a value that is not allowed";
     const char *view = target_value(&rq->target, "view"), *up = target_value(&rq->target, "up");
     if (view && !uz_view_parse(&to->view, view))
-        return problem_fill(problem, 400, "bad_parameter", TITLE,
-                            "view is corner, below, front, back, left, right, top or bottom, not \"%.60s\"", view);
+        return REFUSE_PARAMETER(problem,
+                                "view is corner, below, front, back, left, right, top or bottom, not \"%.60s\"", view);
     if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0)
-        return problem_fill(problem, 400, "bad_parameter", TITLE, "up is y or z, not \"%.60s\"", up);
+        return REFUSE_PARAMETER(problem, "up is y or z, not \"%.60s\"", up);
     to->z_up = up && *up == 'z';
     return true;
 }
@@ -89,20 +88,18 @@ static bool read_view(uz_picture *to, const http_request *rq, problem_details *p
 /* The colour, the factor of the displacements, the width and the view. */
 static bool read_picture(output_options *out, const http_request *rq, problem_details *problem)
 {
-    static const char TITLE[] = "A query parameter has a value that is not allowed";
     const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
     uz_picture *to = &out->picture;
     int64_t width = 900;
     to->colour = UZ_FIELD_VON_MISES;
     if (colour && (!uz_field_parse(&to->colour, colour, strlen(colour)) ||
                    !(to->colour & (UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE))))
-        return problem_fill(problem, 400, "bad_parameter", TITLE,
-                            "colour is von_mises, displacements or pressure, not \"%.60s\"", colour);
+        return REFUSE_PARAMETER(problem, "colour is von_mises, displacements or pressure, not \"%.60s\"", colour);
     to->factor = 0;
     const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
     if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))
-        return problem_fill(problem, 400, "bad_parameter", TITLE,
-                            "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", factor);
+        return REFUSE_PARAMETER(problem, "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"",
+                                factor);
     if (!request_integer(rq, "width", 200, 4000, &width, problem))
         return false;
     to->width = (int)width;
@@ -163,12 +160,11 @@ static bool read_plane(output_options *out, const http_request *rq, problem_deta
     double *const to[] = {out->plane.point, out->plane.normal};
     for (int i = 0; i < 2; i++)
         if (!read_point(to[i], target_value(&rq->target, KEYS[i])) || isnan(to[i][2]))
-            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                                "%s is three numbers with commas between: point=0,0,5&normal=0,0,1", KEYS[i]);
+            return REFUSE_PARAMETER(problem, "%s is three numbers with commas between: point=0,0,5&normal=0,0,1",
+                                    KEYS[i]);
     const double *n = out->plane.normal, length = hypot(hypot(n[0], n[1]), n[2]);
     if (!(length > 0 && isfinite(length)))
-        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "normal is the direction across the plane, and 0,0,0 is none");
+        return REFUSE_PARAMETER(problem, "normal is the direction across the plane, and 0,0,0 is none");
     return true;
 }
 
@@ -180,13 +176,12 @@ static bool read_path(output_options *out, const http_request *rq, problem_detai
     bool apart = false;
     for (int i = 0; i < 2; i++)
         if (!read_point(to[i], target_value(&rq->target, ENDS[i])))
-            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                                "%s is a point, two numbers or three with commas between: from=0,0&to=60,20", ENDS[i]);
+            return REFUSE_PARAMETER(
+                problem, "%s is a point, two numbers or three with commas between: from=0,0&to=60,20", ENDS[i]);
     for (int c = 0; c < 3; c++)
         apart = apart || out->path.from[c] < out->path.to[c] || out->path.from[c] > out->path.to[c];
     if (!apart)
-        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "from and to are the same point: a path leads from one to another");
+        return REFUSE_PARAMETER(problem, "from and to are the same point: a path leads from one to another");
     out->path.count = 101;
     return request_integer(rq, "count", 2, 10000, &out->path.count, problem);
 }

@@ -252,8 +252,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     const bool validate_only = validate && strcmp(validate, "true") == 0;
     bool good = !validate || validate_only || strcmp(validate, "false") == 0;
     if (!good)
-        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                     "validate must be true or false");
+        REFUSE_PARAMETER(&problem, "validate must be true or false");
     good = good && read_key(rq, &key, &problem) &&
            codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
            check_uploads(context, rq, &request, &problem) && check_start(context, &request, rq, &problem) &&

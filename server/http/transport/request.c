@@ -192,8 +192,8 @@ bool request_integer(const http_request *rq, const char *key, int64_t least, int
     bool digits = text[0] == '-' ? text[1] && !text[1 + strspn(text + 1, "0123456789")]
                                  : text[0] && !text[strspn(text, "0123456789")];
     if (!digits || errno || value < least || value > most)
-        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "%s must be an integer from %lld to %lld", key, (long long)least, (long long)most);
+        return REFUSE_PARAMETER(problem, "%s must be an integer from %lld to %lld", key, (long long)least,
+                                (long long)most);
     *out = value;
     return true;
 }

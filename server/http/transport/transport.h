@@ -188,6 +188,9 @@ typedef enum { BODY_JSON, BODY_OTHER, BODY_OF_ANY_PAGE } body_type;
 body_type request_body_type(const http_request *rq);
 /* The client closed its end: an answer would reach nobody. */
 bool request_client_gone(const http_request *rq);
+/* False with a 400 that says what is wrong with the value of a parameter. */
+#define REFUSE_PARAMETER(problem, ...)                                                                                 \
+    problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", __VA_ARGS__)
 /* Reads a decimal integer of the query in [least, most]; absent: *out is left. False with a 400. */
 bool request_integer(const http_request *rq, const char *key, int64_t least, int64_t most, int64_t *out,
                      problem_details *problem);
