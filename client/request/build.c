@@ -125,7 +125,7 @@ static client_exit find_mesh(client_session *s, const char **of_mesh)
     return CLIENT_OK;
 }
 
-client_exit client_build_files(client_session *s, json_t *request)
+static client_exit put_files(client_session *s, json_t *request)
 {
     const client_options *o = s->options;
     const struct {
@@ -223,7 +223,7 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
         json_decref(request);
         return client_complain(s, CLIENT_LOCAL, message);
     }
-    code = client_build_files(s, request);
+    code = put_files(s, request);
     if (code == CLIENT_OK)
         code = client_build_values(s, request);
     if (code == CLIENT_OK && o->name && json_object_set_new(request, "name", json_string(o->name)) != 0)

@@ -34,8 +34,7 @@ bool client_is_deck(const char *path);
 /* The request that the service makes of a deck, new; what is not in it is told on s->err, with `all` also what does not
  * matter. */
 client_exit client_build_deck(client_session *s, json_t **request, const char *path, bool all);
-/* Puts the files and the values of --set into the request. */
-client_exit client_build_files(client_session *s, json_t *request);
+/* Puts the values of --set into the request. */
 client_exit client_build_values(client_session *s, json_t *request);
 
 /* A request for each combination of what varies over jobs, with cases for what varies over cases. *requests: array,

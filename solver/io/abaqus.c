@@ -52,7 +52,8 @@ static bool is_type(const char *name, const char *base)
     return false;
 }
 
-int abaqus_type_number(const char *name)
+/* The number of a type by its name in capitals; -1: there is none. */
+static int type_number(const char *name)
 {
     for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
         for (int m = 0; m < 4; m++)
@@ -274,7 +275,7 @@ static uz_status read_elements(abaqus_file *file, const abaqus_keyword *keyword)
     uz_status status = abaqus_name(name, keyword, "TYPE", true, &file->text);
     for (char *c = name; *c; c++)
         *c = (char)(*c >= 'a' && *c <= 'z' ? *c - 'a' + 'A' : *c);
-    if (status == UZ_OK && (type = abaqus_type_number(name)) < 0)
+    if (status == UZ_OK && (type = type_number(name)) < 0)
         status = abaqus_fail(&file->text, UZ_ERR_UNSUPPORTED, "elements of type %s are not read; %s", name,
                              remedy_for(name));
     if (status == UZ_OK)

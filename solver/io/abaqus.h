@@ -134,8 +134,6 @@ typedef struct {
     const abaqus_family *family; /* of a side or a line; NULL: of the body */
 } abaqus_type;
 enum { ABAQUS_SIDES = UZ_ELEMENT_KINDS }; /* types from here on are no elements of a body */
-/* The number of a type by its name in capitals; -1: there is none. */
-int abaqus_type_number(const char *name);
 abaqus_type abaqus_type_of(int number);
 /* Refuses an element of a family: its line, what it is, and the remedy. */
 uz_status abaqus_fail_no_body(const abaqus_file *file, int64_t element);

@@ -102,7 +102,5 @@ uz_status deck_note(abaqus_deck *d, int64_t line, const char *keyword, uz_deck_e
 bool deck_is_tied(const abaqus_deck *d, const char *interaction);
 /* Goes through the lines (abaqus_deck.c). */
 uz_status deck_read_lines(abaqus_deck *d);
-/* Makes of them what the scene has beside the mesh (abaqus_scene.c). */
-uz_status deck_make_scene(abaqus_deck *d);
 
 #endif

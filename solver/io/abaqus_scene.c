@@ -734,7 +734,8 @@ static uz_status choose_model(abaqus_deck *d)
     return UZ_OK;
 }
 
-uz_status deck_make_scene(abaqus_deck *d)
+/* Makes of the lines what the scene has beside the mesh. */
+static uz_status make_scene(abaqus_deck *d)
 {
     uz_status status = choose_model(d);
     if (status == UZ_OK)
@@ -854,7 +855,7 @@ uz_status uz_deck_read(uz_deck *out, const char *text, size_t len, size_t max_by
     if (status == UZ_OK)
         status = deck_read_lines(&d);
     if (status == UZ_OK)
-        status = deck_make_scene(&d);
+        status = make_scene(&d);
     if (status == UZ_OK && out->n_notes > 0)
         qsort(out->notes, (size_t)out->n_notes, sizeof *out->notes, by_line);
     if (status == UZ_OK && !leave_out)

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int cells_dim(int shape)
+static int dim_of(int shape)
 {
     if (shape < UZ_ELEMENT_KINDS)
         return uz_element_type_of((uz_element_kind)shape)->dim;
@@ -135,14 +135,14 @@ static uz_status choose_dim(int *dim, const cells *mesh, const char *advice)
     int64_t at = 0;
     *dim = 0;
     for (int64_t e = 0; e < mesh->n_cells; e++) {
-        at = cells_dim(mesh->shape[e]) > *dim ? e : at;
-        *dim = cells_dim(mesh->shape[at]);
+        at = dim_of(mesh->shape[e]) > *dim ? e : at;
+        *dim = dim_of(mesh->shape[at]);
     }
     const int64_t line = mesh->n_cells > 0 ? mesh->line[at] : 1;
     if (*dim < 2)
         return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line, "there are no elements of a body; %s", advice);
     for (int64_t e = 0; *dim == 2 && e < mesh->n_cells; e++)
-        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1] && cells_dim(mesh->shape[e]) == 2; q++)
+        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1] && dim_of(mesh->shape[e]) == 2; q++)
             for (int c = 0; c < 3; c++) {
                 low[c] = fmin(low[c], mesh->xyz[3 * mesh->node[q] + c]);
                 high[c] = fmax(high[c], mesh->xyz[3 * mesh->node[q] + c]);
@@ -160,7 +160,7 @@ static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_ce
 {
     int64_t places = 0;
     for (int64_t e = 0; e < mesh->n_cells; e++) {
-        const bool body = cells_dim(mesh->shape[e]) == out->dim;
+        const bool body = dim_of(mesh->shape[e]) == out->dim;
         new_cell[e] = body ? out->n_elements++ : -1;
         places += body ? mesh->first[e + 1] - mesh->first[e] : 0;
     }
@@ -192,7 +192,7 @@ enum { BY_ELEMENTS, BY_SIDES, BY_NODES, WAYS };
 /* How a member of a set belongs to a group. */
 static int way_of(const cells *mesh, const cells_set *set, int64_t i, int dim)
 {
-    const int its_dim = set->nodes ? 0 : cells_dim(mesh->shape[set->index[i]]);
+    const int its_dim = set->nodes ? 0 : dim_of(mesh->shape[set->index[i]]);
     return set->nodes || its_dim < dim - 1 ? BY_NODES : its_dim == dim ? BY_ELEMENTS : BY_SIDES;
 }
 

@@ -8,7 +8,6 @@
 
 /* Shapes of cells: those of elements (uz_element_kind), and these. */
 enum { CELLS_POINT = UZ_ELEMENT_KINDS, CELLS_LINE2, CELLS_LINE3, CELLS_SHAPES };
-int cells_dim(int shape);
 int cells_nodes(int shape);
 
 typedef struct {

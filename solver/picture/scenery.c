@@ -17,7 +17,8 @@
 #define UNSEEN 0.005 /* of the size of the body */
 enum { MARGIN = 50, LEAST_HEIGHT = 160, MOST_HEIGHT = 1600 };
 
-uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x)
+/* Where a point (dim coordinates) is. */
+static uz_raster_point place_point(const uz_scenery *scenery, const double *x)
 {
     double seen[3] = {0, 0, 0};
     for (int i = 0; i < 3; i++)
@@ -28,13 +29,14 @@ uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x)
                              .z = scenery->scale * seen[2]};
 }
 
-uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor)
+/* Where a node is; its place is that before the deformation plus `factor` times the displacement. */
+static uz_raster_point place_node(const uz_scenery *scenery, int64_t node, double factor)
 {
     const int dim = scenery->model->mesh.dim;
     double x[3] = {0, 0, 0};
     for (int c = 0; c < dim; c++)
         x[c] = scenery->model->mesh.xyz[node * dim + c] + factor * scenery->answer->u[node * dim + c];
-    uz_raster_point point = uz_scenery_point(scenery, x);
+    uz_raster_point point = place_point(scenery, x);
     const double range = scenery->high - scenery->low;
     point.value = range > 0 ? (scenery->value[node] - scenery->low) / range : 0.5;
     return point;
@@ -124,7 +126,7 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
     scenery->offset[0] = scenery->offset[1] = 0;
     /* where the nodes are before and after, in lengths */
     for (int64_t i = 0; i < 2 * scenery->model->mesh.n_nodes; i++) {
-        const uz_raster_point p = uz_scenery_node(scenery, i / 2, i % 2 ? scenery->factor : 0);
+        const uz_raster_point p = place_node(scenery, i / 2, i % 2 ? scenery->factor : 0);
         const double at[2] = {p.x, -p.y};
         for (int c = 0; c < 2; c++) {
             low[c] = fmin(low[c], at[c]);
@@ -174,7 +176,7 @@ uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const u
         uz_raster_point p[UZ_CELL_POINTS];
         double area = 0, light = 1;
         for (int k = 0; k < n; k++)
-            p[k] = uz_scenery_node(scenery, around[k], scenery->factor);
+            p[k] = place_node(scenery, around[k], scenery->factor);
         for (int k = 0; k < n; k++)
             area += p[k].x * p[(k + 1) % n].y - p[k].y * p[(k + 1) % n].x;
         if (mesh->dim == 3) {
@@ -214,7 +216,7 @@ uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery
             const int n = side.nodes, corners = side.dim == 2 ? 2 : n % 4 == 0 ? 4 : 3;
             for (int j = 0; j < n; j++) {
                 const int place = n == corners || j % 2 == 0 ? j / (n == corners ? 1 : 2) : corners + j / 2;
-                p[j] = uz_scenery_node(scenery, node[place], scenery->factor);
+                p[j] = place_node(scenery, node[place], scenery->factor);
                 sum += isnan(p[j].value) ? 0 : p[j].value;
                 known += !isnan(p[j].value);
             }
@@ -261,7 +263,7 @@ static void paint_triangles(uz_raster *raster, const uz_scenery *scenery, const 
         uz_raster_point at[3];
         for (int k = 0; k < 3; k++) {
             const double x[3] = {contact->x[i + k], contact->y[i + k], contact->z[i + k]};
-            at[k] = uz_scenery_point(scenery, x);
+            at[k] = place_point(scenery, x);
             at[k].value = NAN;
         }
         paint_triangle(raster, at);
@@ -279,7 +281,7 @@ static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_o
                 double x[3];
                 const int to_the_right = k % 2, above = k / 2;
                 shape->surface(x, p, 2.0 * (i + to_the_right) / CELLS - 1, 2.0 * (j + above) / CELLS - 1);
-                at[k] = uz_scenery_point(scenery, x);
+                at[k] = place_point(scenery, x);
                 at[k].value = NAN;
             }
             for (int k = 0; k < 2; k++) {
@@ -331,8 +333,8 @@ void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_
 {
     uz_buffer_print(svg, "<path class=\"before\" d=\"");
     for (int64_t i = 0; i < edges->n_outline && i < MOST_OUTLINE; i++) {
-        const uz_raster_point a = uz_scenery_node(scenery, edges->outline[2 * i], 0),
-                              b = uz_scenery_node(scenery, edges->outline[2 * i + 1], 0);
+        const uz_raster_point a = place_node(scenery, edges->outline[2 * i], 0),
+                              b = place_node(scenery, edges->outline[2 * i + 1], 0);
         uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1f", a.x, a.y, b.x, b.y);
     }
     uz_buffer_print(svg, "\"/>\n");
@@ -381,14 +383,14 @@ void uz_scenery_put_edges(uz_buffer *svg, const uz_scenery *scenery, const uz_sk
     uz_buffer_print(svg, "<path class=\"edge\" d=\"");
     for (int64_t i = 0; i < edges->n_lines && (some || mesh->n_elements <= (solid ? 4 : 1) * MOST_LINED); i++) {
         const int64_t *end = edges->line + 2 * i;
-        const uz_raster_point a = uz_scenery_node(scenery, end[0], scenery->factor),
-                              b = uz_scenery_node(scenery, end[1], scenery->factor);
+        const uz_raster_point a = place_node(scenery, end[0], scenery->factor),
+                              b = place_node(scenery, end[1], scenery->factor);
         if (!some || !(isnan(a.value) || isnan(b.value)))
             put_seen(svg, body, &a, &b, lift);
     }
     for (int64_t i = 0; i < edges->n_outline && i < MOST_OUTLINE && some; i++) {
-        const uz_raster_point a = uz_scenery_node(scenery, edges->outline[2 * i], scenery->factor),
-                              b = uz_scenery_node(scenery, edges->outline[2 * i + 1], scenery->factor);
+        const uz_raster_point a = place_node(scenery, edges->outline[2 * i], scenery->factor),
+                              b = place_node(scenery, edges->outline[2 * i + 1], scenery->factor);
         put_seen(svg, body, &a, &b, lift);
     }
     uz_buffer_print(svg, "\"/>\n");
@@ -437,7 +439,7 @@ void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
         uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
         const int64_t n = shape->outline(at, way, contact, 0);
         if (n == 1) { /* a line: the part of it that is nearest to the middle of the picture */
-            const uz_raster_point p = uz_scenery_point(scenery, at);
+            const uz_raster_point p = place_point(scenery, at);
             const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
             const double dx = way[0] / length, dy = -way[1] / length;
             const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
@@ -453,7 +455,7 @@ void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
                 continue;
             for (int c = 0; point != i && c < 2; c++)
                 at[c] += far * way[c] / length;
-            border_to(&b, uz_scenery_point(scenery, at));
+            border_to(&b, place_point(scenery, at));
         }
         uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
         uz_buffer_put(svg, b.ticks.data, b.ticks.len);
@@ -516,7 +518,7 @@ double uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery, const uz
         /* Arrows follow the pressure and not the mesh. */
         const double length = ARROW * scenery->pressure[i] / largest, head = fmin(6, 0.4 * length);
         const double *n = info->contact_normal + i * info->dim;
-        const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[i], scenery->factor);
+        const uz_raster_point tip = place_node(scenery, info->contact_node[i], scenery->factor);
         double dx = 0, dy = 0, dz = 0;
         for (int c = 0; c < info->dim; c++) {
             dx += scenery->axes[0][c] * n[c];

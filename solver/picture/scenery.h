@@ -39,11 +39,6 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err);
  * overlapped or stood apart: at least 1; it reads well. */
 double uz_show_factor(const uz_scene *scene, const uz_body_model *model, const uz_field_source *answer);
 
-/* Where a point (dim coordinates) is. */
-uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);
-/* Where a node is; its place is that before the deformation plus `factor` times the displacement. */
-uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor);
-
 /* The surface of the body in colour; of a solid with contacts_only nothing. UZ_ERR_CANCELLED. */
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err);
