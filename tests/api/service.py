@@ -345,6 +345,12 @@ class Service:
         """Posts a job, waits until it ended, and returns it."""
         return self.post(body, {"Prefer": "wait=60"}).json
 
+    def solved(self, body, outcome=None):
+        """As solve; the job has to be successful, with this outcome if one is named."""
+        job = expect(self.post(body, {"Prefer": "wait=60"}), 200).json
+        check(job["status"] == "successful" and (outcome is None or job["summary"]["outcome"] == outcome), str(job)[:900])
+        return job
+
     def wait_status(self, job_id, *statuses, seconds=PATIENT_S):
         end = time.monotonic() + seconds
         while time.monotonic() < end:

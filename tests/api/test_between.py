@@ -22,14 +22,8 @@ def block(n, obstacle, element="quad4", top=0, **contact):
             "contacts": [{"on": "bottom", "obstacle": obstacle, **contact}]}
 
 
-def ended(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
-
-
 def solve(s, problem, fields="displacements,reactions,gaps,pressure,nodes", **more):
-    job = ended(s, {"problem": problem, **more})
+    job = s.solved({"problem": problem, **more})
     result = expect(s.get(f"/v1/jobs/{job['id']}/result?fields={fields}"), 200).json
     check(result["summary"]["outcome"] == "converged", result["summary"])
     return result
@@ -294,9 +288,9 @@ def test_a_ball_between_nodes_in_space(s):
 def test_the_rest_of_the_service_knows_such_rows(s):
     """Load cases, refinement, verification, pictures and files."""
     problem = {**block(20, CIRCLE), "kinematics": "fixed"}
-    ended(s, {"problem": problem, "cases": [{"name": "none", "loads": []},
+    s.solved({"problem": problem, "cases": [{"name": "none", "loads": []},
                                             {"name": "right", "loads": [{"on": "right", "traction": [3, 0]}]}]})
-    job = ended(s, {"problem": problem, "solver": {"accuracy": {"relative_error": 1e-3}, "method": "accelerated_restart"}})
+    job = s.solved({"problem": problem, "solver": {"accuracy": {"relative_error": 1e-3}, "method": "accelerated_restart"}})
     body = {"accuracy": {"relative_error": 1e-9}}
     finer = expect(s.request("POST", f"/v1/jobs/{job['id']}/refine", body, WAIT), 200).json
     check(finer["status"] == "successful", finer)

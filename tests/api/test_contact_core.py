@@ -69,8 +69,7 @@ def scenes(first):
 
 
 def answer_of(s, request, outcome="converged"):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == outcome, job)
+    job = s.solved(request, outcome)
     return job, expect(s.get(f"/v1/jobs/{job['id']}/result?fields=reactions,displacements,pressure"), 200).json
 
 
@@ -138,8 +137,7 @@ def test_load_cases(s):
         if not problem.get("loads"):
             continue
         heavy = [{**problem["loads"][0], "pressure": 3}]
-        job = expect(s.post({**request, "cases": [{"name": "given", "loads": problem["loads"]}, {"name": "heavy", "loads": heavy}]}, WAIT), 200).json
-        check(job["status"] == "successful", name, job)
+        job = s.solved({**request, "cases": [{"name": "given", "loads": problem["loads"]}, {"name": "heavy", "loads": heavy}]})
         for case, loads in (("given", problem["loads"]), ("heavy", heavy)):
             answer = expect(s.get(f"/v1/jobs/{job['id']}/result?case={case}&fields=reactions,displacements,pressure"), 200).json
             near(answer, answer_of(s, {"problem": {**problem, "loads": loads}})[1], name, case)

@@ -16,14 +16,12 @@ try:
 except ImportError:
     meshio = None
 
-WAIT = {"Prefer": "wait=60"}
 COMPUTED = ["contact_status", "stress", "principal", "von_mises", "strain", "stress_gauss"]
 VTU = "displacements,stress,principal,von_mises,strain,pressure,contact_status,reactions,gaps,materials"
 
 
 def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
+    job = s.solved(request)
     return job["id"]
 
 

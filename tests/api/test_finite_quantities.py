@@ -20,8 +20,7 @@ BLOCK = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "fi
 
 
 def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", job)
+    job = s.solved(request, "converged")
     return job["summary"]
 
 

@@ -11,7 +11,6 @@ from service import SCENE, check, expect
 
 SHARED = True  # one service for all tests
 
-WAIT = {"Prefer": "wait=60"}
 
 
 def chosen(accuracy=None, element=None, **solver):
@@ -26,14 +25,8 @@ def chosen(accuracy=None, element=None, **solver):
     return request
 
 
-def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
-
-
 def test_ladder_is_told(s):
-    job = solved(s, chosen({"relative_error": 0.02}))
+    job = s.solved(chosen({"relative_error": 0.02}))
     summary = job["summary"]
     ladder = summary["mesh"]["ladder"]
     check(summary["outcome"] == "converged" and summary["requested_error"] == 0.02, summary)
@@ -51,19 +44,19 @@ def test_ladder_is_told(s):
 
 def test_levels(s):
     for level, asked in ((None, 5e-2), ("balanced", 5e-2), ("quick", 1e-2)):
-        summary = solved(s, chosen(level))["summary"]
+        summary = s.solved(chosen(level))["summary"]
         check(summary["requested_error"] == asked and summary["outcome"] == "converged", level, summary)
 
 
 def test_out_of_reach(s):
-    summary = solved(s, chosen("precise"))["summary"]
+    summary = s.solved(chosen("precise"))["summary"]
     check(summary["outcome"] == "mesh_limit" and summary["total_error"] > 1e-8 and summary["message"], summary)
 
 
 def test_fields_find_the_grid(s):
     """What is computed from the stored request knows the cells that were chosen."""
     for element in ("quad4", "tri6"):
-        job = solved(s, chosen({"relative_error": 0.03}, element))
+        job = s.solved(chosen({"relative_error": 0.03}, element))
         cells = job["summary"]["mesh"]["cells"]
         order = 2 if element == "tri6" else 1
         nodes = (order * cells[0] + 1) * (order * cells[1] + 1)
@@ -74,7 +67,7 @@ def test_fields_find_the_grid(s):
         # the same grid by name gives the same answer
         given = chosen({"relative_error": 1e-10}, element)
         given["problem"]["mesh"]["box"]["cells"] = cells
-        other = expect(s.get(f"/v1/jobs/{solved(s, given)['id']}/result?fields=von_mises"), 200).json
+        other = expect(s.get(f"/v1/jobs/{s.solved(given)['id']}/result?fields=von_mises"), 200).json
         worst = max(abs(a - b) for a, b in zip(answer["von_mises"], other["von_mises"]))
         check(worst < 0.05 * max(other["von_mises"]), element, worst)
 
@@ -82,7 +75,7 @@ def test_fields_find_the_grid(s):
 def test_load_cases(s):
     request = chosen({"relative_error": 0.02})
     request["cases"] = [{"name": "a", "loads": SCENE["problem"]["loads"]}, {"name": "b", "loads": [{"on": "right", "traction": [0, -0.1]}]}]
-    job = solved(s, request)
+    job = s.solved(request)
     check(job["summary"]["mesh"]["ladder"] and job["summary"]["cases"]["count"] == 2, job["summary"])
     check(job["summary"]["total_error"] <= 0.02 and job["summary"]["outcome"] == "converged", job["summary"])
     cells = job["summary"]["mesh"]["cells"]
@@ -101,7 +94,7 @@ def test_what_needs_a_mesh_is_refused(s):
     box = "/problem/mesh/box/cells"
     refused(s, chosen(stopping="paper"), 422, "not_allowed", "/solver/stopping")
     refused(s, chosen(warm_start={"reactions": [0.0]}), 422, "not_allowed", "/solver/warm_start")
-    job = solved(s, chosen({"relative_error": 0.03}))
+    job = s.solved(chosen({"relative_error": 0.03}))
     refused(s, chosen(warm_start={"job": job["id"]}), 422, "not_allowed", "/solver/warm_start")
     reply = expect(s.request("POST", f"/v1/jobs/{job['id']}/refine", {"accuracy": "quick"}), 409).json
     check(reply["code"] == "mesh_is_chosen", reply)
@@ -116,16 +109,16 @@ def test_what_needs_a_mesh_is_refused(s):
 
 def test_its_reactions_start_the_same_grid(s):
     """A job with the cells that were chosen may start from the one that chose them."""
-    job = solved(s, chosen({"relative_error": 0.02}))
+    job = s.solved(chosen({"relative_error": 0.02}))
     given = chosen({"relative_error": 1e-8}, method="accelerated_restart", warm_start={"job": job["id"]})
     given["problem"]["mesh"]["box"]["cells"] = job["summary"]["mesh"]["cells"]
-    summary = solved(s, given)["summary"]
+    summary = s.solved(given)["summary"]
     check(summary["outcome"] == "converged" and summary["started_from"] == "warm", summary)
 
 
 @service.options("--memory", "10M")
 def test_memory_limit(s):
-    summary = solved(s, chosen({"relative_error": 1e-3}))["summary"]
+    summary = s.solved(chosen({"relative_error": 1e-3}))["summary"]
     check(summary["outcome"] == "mesh_limit" and summary["total_error"] > 1e-3, summary)
     check("bytes" in summary["message"] and summary["cost"]["actual"]["bytes"] < 10e6, summary)
 

@@ -31,12 +31,6 @@ def result(s, job, query=""):
     return expect(s.get(f"/v1/jobs/{job}/result{query}"), 200).json
 
 
-def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
-
-
 def close(x, y, scale=()):
     """Numbers or points that differ by no more than what both runs leave, each certified to 1e-6: relative to the largest,
     also of `scale`."""
@@ -49,11 +43,11 @@ def close(x, y, scale=()):
 # ---------------------------------------------------------------- answers
 
 def test_each_case_is_what_a_job_of_its_own_gives(s):
-    job = solved(s, with_cases())
+    job = s.solved(with_cases())
     answer = result(s, job["id"], ALL)
     check([case["name"] for case in answer["cases"]] == list(LOADS), answer["cases"])
     for case in answer["cases"]:
-        one = result(s, solved(s, alone(case["name"]))["id"], ALL)
+        one = result(s, s.solved(alone(case["name"]))["id"], ALL)
         for field in ("reactions", "gaps", "pressure", "displacements"):
             scale = one["displacements"] if field == "gaps" else ()  # where all touch, gaps are rounding alone
             check(close(case[field], one[field], scale), case["name"], field)
@@ -64,7 +58,7 @@ def test_each_case_is_what_a_job_of_its_own_gives(s):
 
 
 def test_one_case_alone(s):
-    job = solved(s, with_cases())
+    job = s.solved(with_cases())
     everything = result(s, job["id"], ALL)
     for case in everything["cases"]:
         one = result(s, job["id"], f"{ALL}&case={case['name']}")
@@ -78,7 +72,7 @@ def test_one_case_alone(s):
 
 @options()
 def test_summary_of_the_job(s):
-    job = solved(s, with_cases())
+    job = s.solved(with_cases())
     summary = job["summary"]
     cases = {case["name"]: case["summary"] for case in result(s, job["id"])["cases"]}
     check(summary["outcome"] == "converged" and summary["message"] == "", summary)
@@ -95,7 +89,7 @@ def test_summary_of_the_job(s):
 
 
 def test_one_bad_case_is_not_hidden(s):
-    job = solved(s, with_cases(solver={"method": "accelerated_restart", "accuracy": {"relative_error": 1e-6},
+    job = s.solved(with_cases(solver={"method": "accelerated_restart", "accuracy": {"relative_error": 1e-6},
                                        "max_iterations": 20}))
     cases = {case["name"]: case["summary"] for case in result(s, job["id"])["cases"]}
     check(cases["none"]["outcome"] == "converged" and cases["heavy"]["outcome"] == "iteration_limit", cases)
@@ -110,7 +104,7 @@ def test_an_infeasible_case(s):
     request = {**copy.deepcopy(MATRICES), "cases": [{"name": "fine", "h": [0.25, 10]}, {"name": "torn", "h": [-1, -1]}]}
     request["problem"]["N"] = "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 1\n2 1 -1\n"
     request["problem"]["h"] = [0.5, 10]
-    job = solved(s, request)
+    job = s.solved(request)
     check(job["summary"]["outcome"] == "infeasible" and job["summary"]["cases"]["infeasible"] == 1, job)
     check(job["summary"]["certificate"]["relative_error"] is None, job)
     fine, torn = result(s, job["id"])["cases"]
@@ -120,7 +114,7 @@ def test_an_infeasible_case(s):
 
 def test_cases_of_matrices(s):
     request = {**MATRICES, "cases": [{"name": "p", "p": [0, 2]}, {"name": "h", "h": [0.25]}, {"name": "é 1/2", "p": [8, 2], "h": [1]}]}
-    job = solved(s, request)
+    job = s.solved(request)
     answers = {case["name"]: case for case in result(s, job["id"], ALL)["cases"]}
     for name, u, r in (("p", [0, 2], 0), ("h", [0.25, 2], -1.5), ("é 1/2", [1, 2], -6)):
         case = answers[name]
@@ -133,12 +127,12 @@ def test_cases_of_matrices(s):
 # ---------------------------------------------------------------- what is refused
 
 def test_names_that_are_no_case(s):
-    job = solved(s, with_cases())["id"]
+    job = s.solved(with_cases())["id"]
     for path in (f"/v1/jobs/{job}/result?case=haevy", f"/v1/jobs/{job}/history?case=haevy",
                  f"/v1/jobs/{job}/history.csv?case=haevy"):
         problem = expect(s.get(path), 404, "case_not_found").json
         check('Did you mean "heavy"?' in problem["detail"] and '"light", "heavy"' in problem["detail"], problem)
-    plain = solved(s, SCENE)["id"]
+    plain = s.solved(SCENE)["id"]
     for kind in ("result", "history"):
         problem = expect(s.get(f"/v1/jobs/{plain}/{kind}?case=heavy"), 404, "case_not_found").json
         check("no cases" in problem["detail"], problem)
@@ -169,7 +163,7 @@ def test_a_fault_that_shows_when_it_runs(s):
 # ---------------------------------------------------------------- histories
 
 def test_histories(s):
-    job = solved(s, with_cases())["id"]
+    job = s.solved(with_cases())["id"]
     problem = expect(s.get(f"/v1/jobs/{job}/history"), 400, "case_needed").json
     check("?case=NAME" in problem["detail"] and '"tripled"' in problem["detail"], problem)
     for case in result(s, job)["cases"]:
@@ -210,7 +204,7 @@ def test_too_much_for_one_reply(s):
                            "K": f"%%MatrixMarket matrix coordinate real symmetric\n{d} {d} {d}\n{diagonal}",
                            "N": f"%%MatrixMarket matrix coordinate real general\n1 {d} 1\n1 1 1\n"},
                "cases": [{"name": f"n{i}", "h": [i / count]} for i in range(count)]}
-    job = solved(s, request)["id"]
+    job = s.solved(request)["id"]
     check(len(result(s, job)["cases"]) == count, "reactions and gaps fit")
     problem = expect(s.get(f"/v1/jobs/{job}/result?fields=displacements"), 413, "result_too_large").json
     check("?case=NAME" in problem["detail"], problem)
@@ -244,27 +238,27 @@ def start(request, **warm):
 
 
 def test_start_from_a_job(s):
-    first = solved(s, SCENE)
-    again = solved(s, start(SCENE, job=first["id"]))
+    first = s.solved(SCENE)
+    again = s.solved(start(SCENE, job=first["id"]))
     check(again["summary"]["started_from"] == "warm" and again["summary"]["outcome"] == "converged", again)
     check(again["summary"]["iterations"] < first["summary"]["iterations"] / 4, again["summary"]["iterations"])
     check(first["summary"]["started_from"] == "zero", first)
 
 
 def test_start_from_reactions(s):
-    first = solved(s, SCENE)
+    first = s.solved(SCENE)
     reactions = result(s, first["id"])["reactions"]
-    again = solved(s, start(SCENE, reactions=reactions))
+    again = s.solved(start(SCENE, reactions=reactions))
     check(again["summary"]["started_from"] == "warm", again)
     check(again["summary"]["iterations"] < first["summary"]["iterations"] / 4, again["summary"]["iterations"])
-    anything = solved(s, start(SCENE, reactions=[5.0, -100.0] * 15))
+    anything = s.solved(start(SCENE, reactions=[5.0, -100.0] * 15))
     check(anything["summary"]["outcome"] == "converged", anything)
     check(abs(anything["summary"]["energy"]["primal"] / first["summary"]["energy"]["primal"] - 1) < 1e-10, anything)
 
 
 def test_every_case_starts_there(s):
-    many = solved(s, with_cases())
-    again = solved(s, start(with_cases(), job=many["id"], case="heavy"))
+    many = s.solved(with_cases())
+    again = s.solved(start(with_cases(), job=many["id"], case="heavy"))
     cases = result(s, again["id"])["cases"]
     check(all(case["summary"]["started_from"] == "warm" for case in cases), cases)
     check(again["summary"]["started_from"] == "warm", again)
@@ -273,7 +267,7 @@ def test_every_case_starts_there(s):
 
 
 def test_starts_that_are_refused(s):
-    small, scene, many = (solved(s, body)["id"] for body in (MATRICES, SCENE, with_cases()))
+    small, scene, many = (s.solved(body)["id"] for body in (MATRICES, SCENE, with_cases()))
     running = expect(s.post(ENDLESS), 202).json["id"]
     failed = expect(s.post({"problem": {**MATRICES["problem"], "K": MATRICES["problem"]["K"].replace("1 1 2", "1 1 -2")}},
                            WAIT), 200).json
@@ -303,7 +297,7 @@ def test_starts_that_are_refused(s):
 
 @options("--workers", "1")
 def test_a_start_that_was_deleted(s):
-    first = solved(s, SCENE)
+    first = s.solved(SCENE)
     blocking = expect(s.post(ENDLESS), 202).json["id"]
     waiting = expect(s.post(start(SCENE, job=first["id"])), 202).json["id"]
     expect(s.request("DELETE", f"/v1/jobs/{first['id']}"), 204)

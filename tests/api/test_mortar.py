@@ -77,8 +77,7 @@ def lame(interference):
 
 
 def answer_of(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", job)
+    job = s.solved(request, "converged")
     return expect(s.get(f"/v1/jobs/{job['id']}/result?fields=pressure,reactions,gaps,stress,displacements"), 200).json
 
 

@@ -7,12 +7,11 @@ import math
 import pathlib
 
 import service
-from service import check, expect
+from service import check
 from two_bodies import body
 
 SHARED = True  # one service for all tests
 
-WAIT = {"Prefer": "wait=120"}
 SCENES = pathlib.Path(__file__).resolve().parent.parent / "data" / "scenes"
 
 
@@ -58,8 +57,7 @@ def ellipse_in_hole(kind, **contact):
 
 
 def summary_of(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job.get("error"))
+    job = s.solved(request)
     return job["summary"]
 
 

@@ -12,8 +12,7 @@ WAIT = {"Prefer": "wait=120"}
 
 
 def answer_of(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", str(job)[:900])
+    job = s.solved(request, "converged")
     return expect(s.get(f"/v1/jobs/{job['id']}/result?fields=pressure,reactions,displacements"), 200).json
 
 

@@ -12,8 +12,7 @@ ROOF, FOOT, END = {"where": {"y": 20}}, {"where": {"normal": {"direction": [0, -
 
 
 def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", str(job)[:900])
+    job = s.solved(request, "converged")
     return job["summary"], expect(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements"), 200).json["displacements"]
 
 
@@ -93,8 +92,7 @@ def test_cases_quantities_and_refined_meshes(s):
                         {"name": "b", "loads": [{"on": {"where": {"x": {"min": 30}, "y": 20}}, "force": [0, -4]}]}]
     tip = {"quantity": "displacement", "on": {"where": {"nearest": [60, 20]}}, "direction": [0, 1], "name": "tip"}
     request["quantities"] = [tip, {"quantity": "contact.force", "on": FOOT, "name": "foot"}]
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", str(job)[:900])
+    job = s.solved(request)
     names = copy.deepcopy(request)
     for key, name in (("supports", "left"), ("contacts", "bottom")):
         names["problem"][key][0]["on"] = name

@@ -32,8 +32,7 @@ HERTZ = {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"box": {
 
 
 def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
+    job = s.solved(request)
     return job["summary"]
 
 

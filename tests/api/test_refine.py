@@ -18,12 +18,6 @@ def scene(error, **solver):
     return {**copy.deepcopy(SCENE), "solver": {"method": "accelerated_restart", "accuracy": {"relative_error": error}, **solver}}
 
 
-def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
-
-
 def refine(s, job, body, headers=WAIT, status=200, code=None):
     return expect(s.request("POST", f"/v1/jobs/{job}/refine", body, headers), status, code)
 
@@ -78,8 +72,8 @@ def check_same(a, b, *what):
 
 def check_continues(s, **solver):
     """Stopped at 1e-3 and refined to 1e-6 is the run to 1e-6, bit for bit."""
-    first = solved(s, scene(1e-3, **solver))
-    whole = solved(s, scene(1e-6, **solver))
+    first = s.solved(scene(1e-3, **solver))
+    whole = s.solved(scene(1e-6, **solver))
     new = refined(s, first["id"])
     check(new["summary"]["started_from"] == "continued", new)
     check(0 < first["summary"]["iterations"] < whole["summary"]["iterations"], first["summary"], whole["summary"])
@@ -99,32 +93,32 @@ def test_other_methods_and_operators(s):
 
 
 def test_step_by_step(s):
-    jobs = [solved(s, scene(1e-1))]
+    jobs = [s.solved(scene(1e-1))]
     for error in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         jobs.append(refined(s, jobs[-1]["id"], error))
-    whole = solved(s, scene(1e-6))["id"]
+    whole = s.solved(scene(1e-6))["id"]
     check_same(answer(s, jobs[-1]["id"]), answer(s, whole))
     check_history(s, jobs[-1]["id"], whole, [job["summary"] for job in jobs[:-1]])
 
 
 def test_across_a_restart_of_the_service(s):
-    first, whole = solved(s, scene(1e-3))["id"], solved(s, scene(1e-6))["id"]
+    first, whole = s.solved(scene(1e-3))["id"], s.solved(scene(1e-6))["id"]
     s.restart()
     check_same(answer(s, refined(s, first)["id"]), answer(s, whole))
 
 
 def test_iterations_count_from_the_first_run(s):
-    first = solved(s, scene(1e-6, max_iterations=100))
+    first = s.solved(scene(1e-6, max_iterations=100))
     check(first["summary"]["outcome"] == "iteration_limit", first)
     still = refined(s, first["id"])
     check(still["summary"]["outcome"] == "iteration_limit" and still["summary"]["iterations"] == 100, still)
     whole = refined(s, still["id"], max_iterations=1000)
     check(whole["summary"]["outcome"] == "converged", whole)
-    check_same(answer(s, whole["id"]), answer(s, solved(s, scene(1e-6))["id"]))
+    check_same(answer(s, whole["id"]), answer(s, s.solved(scene(1e-6))["id"]))
 
 
 def test_looser_takes_no_iteration(s):
-    first = solved(s, scene(1e-6))
+    first = s.solved(scene(1e-6))
     new = refined(s, first["id"], 1e-2)
     check(new["summary"]["iterations"] == first["summary"]["iterations"], new)
     check(new["summary"]["outcome"] == "converged" and new["summary"]["requested_error"] == 1e-2, new)
@@ -133,15 +127,15 @@ def test_looser_takes_no_iteration(s):
 
 
 def test_a_method_without_iterations(s):
-    first = solved(s, scene(1e-3, method="active_set"))
+    first = s.solved(scene(1e-3, method="active_set"))
     new = refined(s, first["id"], 1e-10)
     check(new["summary"]["outcome"] == "converged" and new["summary"]["method"] == "active_set", new)
     check(new["summary"]["certificate"]["relative_error"] <= 1e-10, new)
 
 
 def test_auto(s):
-    first = solved(s, scene(1e-2, method="auto"))
-    whole = solved(s, scene(1e-10, method="auto"))
+    first = s.solved(scene(1e-2, method="auto"))
+    whole = s.solved(scene(1e-10, method="auto"))
     new = refined(s, first["id"], 1e-10)
     for one in (whole, new):
         check(one["summary"]["outcome"] == "converged", one)
@@ -150,14 +144,14 @@ def test_auto(s):
 
 
 def test_the_papers_rule_gives_way(s):
-    first = solved(s, scene(1e-2, stopping="paper", epsilon=1e-2))
+    first = s.solved(scene(1e-2, stopping="paper", epsilon=1e-2))
     new = refined(s, first["id"], 1e-7)
     check(new["summary"]["outcome"] == "converged" and new["summary"]["requested_error"] == 1e-7, new)
     check(new["summary"]["iterations"] > first["summary"]["iterations"], first, new)
 
 
 def test_matrices_and_tags(s):
-    first = solved(s, {**MATRICES, "tags": ["mine"], "solver": {"accuracy": "quick"}})
+    first = s.solved({**MATRICES, "tags": ["mine"], "solver": {"accuracy": "quick"}})
     new = refine(s, first["id"], {"accuracy": "exact"}).json
     check(new["status"] == "successful" and new["tags"] == ["mine"], new)
     check(new["summary"]["requested_error"] < 1e-10, new)
@@ -172,8 +166,8 @@ CASES = [{"name": "light", "loads": [{"on": "top", "traction": [0, -0.05]}]},
 
 
 def test_cases(s):
-    first = solved(s, {**scene(1e-3), "cases": CASES})
-    whole = solved(s, {**scene(1e-6), "cases": CASES})
+    first = s.solved({**scene(1e-3), "cases": CASES})
+    whole = s.solved({**scene(1e-6), "cases": CASES})
     new = refined(s, first["id"])
     check(new["summary"]["started_from"] == "continued", new)
     check(new["summary"]["iterations"] == whole["summary"]["iterations"], new, whole)
@@ -186,7 +180,7 @@ def test_cases(s):
 # ---------------------------------------------------------------- the old job
 
 def test_the_old_job_may_go(s):
-    first, whole = solved(s, scene(1e-3)), solved(s, scene(1e-6))["id"]
+    first, whole = s.solved(scene(1e-3)), s.solved(scene(1e-6))["id"]
     new = refined(s, first["id"])["id"]
     expect(s.request("DELETE", f"/v1/jobs/{first['id']}"), 204)
     check_same(answer(s, new), answer(s, whole))
@@ -197,7 +191,7 @@ def test_the_old_job_may_go(s):
 
 @options("--workers", "1")
 def test_the_old_job_goes_first(s):
-    first, whole = solved(s, scene(1e-3))["id"], solved(s, scene(1e-6))["id"]
+    first, whole = s.solved(scene(1e-3))["id"], s.solved(scene(1e-6))["id"]
     blocking = expect(s.post(ENDLESS), 202).json["id"]
     reply = refine(s, first, {"accuracy": {"relative_error": 1e-6}}, {}, 202)
     new = reply.json["id"]
@@ -234,7 +228,7 @@ def test_jobs_without_an_answer(s):
     torn = copy.deepcopy(MATRICES)
     torn["problem"]["N"] = "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 1\n2 1 -1\n"
     torn["problem"]["h"] = [-1, -1]
-    torn = solved(s, torn)["id"]
+    torn = s.solved(torn)["id"]
     given = expect(s.request("POST", "/v1/verify", {**MATRICES, "answer": {"displacements": [0.5, 2], "reactions": [-1]}},
                              WAIT), 200).json["job"]
     refine(s, "0" * 32, body, status=404, code="not_found")
@@ -245,7 +239,7 @@ def test_jobs_without_an_answer(s):
 
 
 def test_bodies_that_are_refused(s):
-    job = solved(s, MATRICES)["id"]
+    job = s.solved(MATRICES)["id"]
     count = len(expect(s.get("/v1/jobs"), 200).json["jobs"])
     for body, code, pointer in (({}, "missing_key", ""), ({"accuracy": 1}, "wrong_type", "/accuracy"),
                                 ({"accuracy": "exactly"}, "not_allowed", "/accuracy"),
@@ -261,7 +255,7 @@ def test_bodies_that_are_refused(s):
 
 
 def test_idempotency(s):
-    job = solved(s, scene(1e-3))["id"]
+    job = s.solved(scene(1e-3))["id"]
     headers = {**WAIT, "Idempotency-Key": "again"}
     one = refine(s, job, {"accuracy": "precise"}, headers).json["id"]
     check(refine(s, job, {"accuracy": "precise"}, headers).json["id"] == one, "two jobs")
@@ -276,7 +270,7 @@ def client(s, *words):
 
 
 def test_client(s):
-    job = solved(s, scene(1e-3))["id"]
+    job = s.solved(scene(1e-3))["id"]
     done = client(s, "refine", job, "--accuracy", "1e-8", "--wait")
     check(done.returncode == 0 and "continued from another job" in done.stdout, done)
     done = client(s, "refine", job, "-a", "exact", "--json", "-w")

@@ -58,8 +58,7 @@ CYLINDER = {"cylinder": {"point": [0, 39.75, 0], "axis": [0, 0, 1], "radius": 30
 
 def solved(s, problem, error, **solver):
     request = {"problem": problem, "solver": {"accuracy": {"relative_error": error}, **solver}}
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", job)
+    job = s.solved(request, "converged")
     check(job["summary"]["error"]["total"] <= error, job["summary"]["error"])
     return job
 

@@ -55,14 +55,8 @@ def gmsh_of(mesh):
     return "\n".join(lines + [str(len(items))] + [f"{i + 1} {item}" for i, item in enumerate(items)] + ["$EndElements", ""])
 
 
-def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
-
-
 def test_grids_are_told(s):
-    summary = solved(s, refined({"relative_error": 0.03}))["summary"]
+    summary = s.solved(refined({"relative_error": 0.03}))["summary"]
     mesh = summary["mesh"]
     check(summary["outcome"] == "converged" and summary["error"]["total"] <= 0.03, summary)
     check(mesh["refined"] is True and "cells" not in mesh and len(mesh["ladder"]) > 3, mesh)
@@ -79,7 +73,7 @@ def test_a_mesh_of_any_origin(s):
     file["problem"]["mesh"] = {"gmsh": gmsh_of(numbers["problem"]["mesh"]), "refine": "auto"}
     found = []
     for request in (refined({"relative_error": 0.04}), numbers, file):
-        summary = solved(s, request)["summary"]
+        summary = s.solved(request)["summary"]
         check(summary["outcome"] == "converged", summary)
         found.append((summary["mesh"]["ladder"][0]["elements"], summary["mesh"]["elements"]))
     check(found[0][0] == found[1][0] == 24 and found[1] == found[2], found)
@@ -88,7 +82,7 @@ def test_a_mesh_of_any_origin(s):
 
 def test_fields_find_the_mesh(s):
     for element, cells in (("tri3", (6, 2)), ("tri6", (6, 2)), ("tri3", "auto")):
-        job = solved(s, refined({"relative_error": 0.03}, element, cells))
+        job = s.solved(refined({"relative_error": 0.03}, element, cells))
         answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=von_mises,pressure,nodes,stress,displacements"),
                         200).json
         nodes = len(answer["nodes"])
@@ -99,17 +93,17 @@ def test_fields_find_the_mesh(s):
 
 
 def test_levels_and_limits(s):
-    summary = solved(s, refined())["summary"]
+    summary = s.solved(refined())["summary"]
     check(summary["requested_error"] == 5e-2 and summary["outcome"] == "converged", summary)
-    summary = solved(s, refined("precise"))["summary"]
+    summary = s.solved(refined("precise"))["summary"]
     check(summary["outcome"] == "mesh_limit" and summary["message"], summary)
-    summary = solved(s, refined({"relative_error": 2e-3}, time_limit_s=0.2))["summary"]
+    summary = s.solved(refined({"relative_error": 2e-3}, time_limit_s=0.2))["summary"]
     check(summary["outcome"] == "time_limit" and summary["error"]["total"] > 2e-3, summary)
 
 
 def test_a_guaranteed_error_is_met(s):
     """The whole error is the proved one: the energies enclose the body's, and further grids follow until it suffices."""
-    summary = solved(s, refined({"total": 0.02, "guaranteed": True}))["summary"]
+    summary = s.solved(refined({"total": 0.02, "guaranteed": True}))["summary"]
     error = summary["error"]
     check(summary["outcome"] == "converged" and error["kind"] == "guaranteed" and error["total"] <= 0.02, summary)
     check(summary["mesh"]["refined"] and summary["problem"]["d"] < 1000, summary["mesh"])
@@ -139,7 +133,7 @@ def test_what_can_not_be_refined_is_refused(s):
     del wrong["problem"]["mesh"]["box"]
     wrong["problem"]["mesh"]["refine"] = "auto"
     check(expect(s.post(wrong), 422).json["pointer"] == "/problem/mesh", "no mesh to refine")
-    job = solved(s, refined())
+    job = s.solved(refined())
     reply = expect(s.request("POST", f"/v1/jobs/{job['id']}/refine", {"accuracy": "quick"}), 409).json
     check(reply["code"] == "mesh_is_chosen", reply)
 
@@ -148,7 +142,7 @@ def test_load_cases(s):
     request = refined({"relative_error": 0.04})
     request["cases"] = [{"name": "a", "loads": SCENE["problem"]["loads"]},
                         {"name": "b", "loads": [{"on": "right", "traction": [0, -0.1]}]}]
-    job = solved(s, request)
+    job = s.solved(request)
     check(job["summary"]["outcome"] == "converged" and job["summary"]["mesh"]["refined"], job["summary"])
     sizes = {len(expect(s.get(f"/v1/jobs/{job['id']}/result?case={name}&fields=von_mises"), 200).json["von_mises"])
              for name in ("a", "b")}
@@ -162,7 +156,7 @@ def test_groups_of_nodes_mean_the_same(s):
     groups["nodes"] = {"nodes": sorted({i for edge in groups["top"]["edges"] for i in edge})}
     request["problem"]["loads"] = [{"on": "nodes", "force": [0, -1]}]
     del request["problem"]["contacts"]
-    summary = solved(s, request)["summary"]
+    summary = s.solved(request)["summary"]
     loads = summary["resultants"]["loads"]
     check(len(summary["mesh"]["ladder"]) > 2 and abs(loads["force"][1] + 1) < 1e-9 and abs(loads["moment"][0] + 30) < 1e-6, loads)
     request["problem"]["loads"] = [{"on": "all", "body_force": [1, -1]}]
@@ -171,7 +165,7 @@ def test_groups_of_nodes_mean_the_same(s):
     found = []
     for name in ("held", "held_nodes"):
         request["problem"]["supports"] = [{"on": name, "ux": 0, "uy": 0}]
-        found.append(solved(s, request)["summary"])
+        found.append(s.solved(request)["summary"])
     check(len(found[0]["mesh"]["ladder"]) > 1 and abs(found[1]["energy"]["strain"] / found[0]["energy"]["strain"] - 1) < 1e-9,
           found[0]["energy"], found[1]["energy"])
 
@@ -179,7 +173,7 @@ def test_groups_of_nodes_mean_the_same(s):
 def test_a_formulation_of_elements_that_are_all_bisected(s):
     request = refined({"relative_error": 0.015}, "quad4", (2, 1))
     request["problem"]["formulation"] = "incompatible_modes"
-    summary = solved(s, request)["summary"]
+    summary = s.solved(request)["summary"]
     check(summary["outcome"] == "converged" and summary["mesh"]["elements"] > 16, summary["message"], summary["mesh"])
 
 
@@ -207,8 +201,8 @@ def block(rng):
 
 def check_told(s, problem, few, fine, asked):
     """The error told at the end is at least half of the true one, by the energy of a much finer mesh."""
-    mine = solved(s, {"problem": {**problem, "mesh": few}, "solver": {"accuracy": {"relative_error": asked}}})["summary"]
-    best = solved(s, {"problem": {**problem, "mesh": fine}, "solver": {"accuracy": {"relative_error": 1e-6}}})["summary"]
+    mine = s.solved({"problem": {**problem, "mesh": few}, "solver": {"accuracy": {"relative_error": asked}}})["summary"]
+    best = s.solved({"problem": {**problem, "mesh": fine}, "solver": {"accuracy": {"relative_error": 1e-6}}})["summary"]
     check(mine["outcome"] == "converged" and mine["error"]["total"] <= asked, mine["message"])
     lost = mine["energy"]["potential"] - best["energy"]["potential"]
     true = math.sqrt(max(0, lost) / best["energy"]["strain"])

@@ -8,7 +8,6 @@ from service import SCENE, check, expect
 
 SHARED = True  # one service for all tests
 
-WAIT = {"Prefer": "wait=60"}
 A, B, PRESSURE, NU, YIELD = 1.0, 2.0, 3.0, 0.3, 20.0
 
 # a tube that its ends keep from getting longer, under pressure in its bore
@@ -19,12 +18,6 @@ TUBE = {"problem": {"kind": "scene", "model": "axisymmetric",
                     "supports": [{"on": "bottom", "uy": 0}, {"on": "top", "uy": 0}],
                     "loads": [{"on": "left", "pressure": PRESSURE}], "contacts": []},
         "solver": {"accuracy": {"total": 1e-3}}}
-
-
-def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
-    return job
 
 
 def of_lame():
@@ -38,7 +31,7 @@ def of_lame():
 def test_a_tube_under_pressure(s):
     request = {**TUBE, "assert": [{"quantity": "stress.safety", "min": 1.5}, {"quantity": "stress.von_mises", "max": 6.5},
                                   {"quantity": "stress.von_mises", "max": of_lame()}]}
-    job = solved(s, request)
+    job = s.solved(request)
     stress = job["summary"]["stress"]
     exact = of_lame()
     check(abs(stress["von_mises"] - exact) < 5e-3 * exact and stress["at"]["x"][0] == A, stress)
@@ -53,7 +46,7 @@ def test_a_tube_under_pressure(s):
 def test_it_is_the_largest_of_the_field(s):
     request = copy.deepcopy(SCENE)
     request["assert"] = [{"quantity": "stress.von_mises", "max": 1e6}]
-    job = solved(s, request)
+    job = s.solved(request)
     stress = job["summary"]["stress"]
     check("safety" not in stress and stress["estimates"]["von_mises"]["low"] is None, stress)
     field = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=von_mises,nodes"), 200).json
@@ -62,7 +55,7 @@ def test_it_is_the_largest_of_the_field(s):
 
 
 def test_only_where_it_is_asked_for(s):
-    check("stress" not in solved(s, SCENE)["summary"], "not asked for")
+    check("stress" not in s.solved(SCENE)["summary"], "not asked for")
 
 
 def test_the_weakest_place_need_not_be_the_most_stressed(s):
@@ -76,7 +69,7 @@ def test_the_weakest_place_need_not_be_the_most_stressed(s):
                            "supports": [{"on": "left", "ux": 0, "uy": 0}],
                            "loads": [{"on": "right", "traction": [5, 0]},
                                      {"on": "hard", "body_force": [0.5, 0]}], "contacts": []}}
-    stress = solved(s, request)["summary"]["stress"]
+    stress = s.solved(request)["summary"]["stress"]
     check(stress["at"]["x"][0] == 0 and abs(stress["von_mises"] - 6) < 1e-6, stress)
     check(stress["weakest_at"]["x"][0] >= 2 and abs(stress["safety"] - 2) < 0.1, stress)
 
@@ -89,7 +82,7 @@ def test_a_corner_has_no_largest_stress(s):
     request["problem"]["materials"][0]["poisson"] = 0.45  # held at its end, the body cannot contract there
     request["solver"]["accuracy"]["total"] = 0.01
     request["assert"] = [{"quantity": "stress.safety", "min": 2}]
-    summary = solved(s, request)["summary"]
+    summary = s.solved(request)["summary"]
     safety = summary["stress"]["estimates"]["safety"]
     check(summary["assertions"][0]["result"] == "uncertain" and safety["low"] == 0 and "no" in safety["why"], summary["stress"])
 
@@ -102,7 +95,7 @@ def test_of_large_deformation(s):
                            "materials": [{"on": "all", "young": 10, "poisson": 0, "law": "st_venant_kirchhoff", "yield": 300}],
                            "supports": [{"on": "left", "ux": 0}, {"on": "right", "ux": 1}, {"on": "bottom", "uy": 0}],
                            "contacts": []}}
-    stress = solved(s, request)["summary"]["stress"]
+    stress = s.solved(request)["summary"]["stress"]
     check(abs(stress["von_mises"] - 30) < 1e-6 and abs(stress["safety"] - 10) < 1e-6, stress)
 
 

@@ -11,11 +11,8 @@ TIE = [{"on": "roof", "to": "floor"}]
 
 
 def answer(s, request):
-    job = s.post(request)
-    expect(job, 202)
-    ended = s.wait_status(job.json["id"], "successful", "failed")
-    check(ended["status"] == "successful", ended)
-    found = s.get(f"/v1/jobs/{job.json['id']}/result?fields=summary,displacements,nodes,reactions").json
+    job = s.solved(request)
+    found = s.get(f"/v1/jobs/{job['id']}/result?fields=summary,displacements,nodes,reactions").json
     check(found["summary"]["outcome"] == "converged", found["summary"]["outcome"])
     check(found["summary"]["resultants"]["imbalance"] < 1e-9, found["summary"]["resultants"])
     return found

@@ -15,8 +15,7 @@ RIGHT = {"displacements": [0.5, 2], "reactions": [-1]}  # of MATRICES
 
 
 def solved(s, request):
-    job = expect(s.post(request, WAIT), 200).json
-    check(job["status"] == "successful", job)
+    job = s.solved(request)
     fields = "?fields=displacements,reactions,summary"
     return expect(s.get(f"/v1/jobs/{job['id']}/result{fields}"), 200).json
 
