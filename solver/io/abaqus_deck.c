@@ -850,83 +850,62 @@ static bool is_procedure(const abaqus_keyword *keyword)
 
 static const struct {
     const char *name;
-    uz_status (*read)(abaqus_deck *d, const abaqus_keyword *keyword); /* NULL: see silent and text */
-    bool silent;      /* a part of the mesh, or a bracket: nothing is to be told */
-    const char *text; /* what is told of one that is left out; NULL: it says nothing about the answer */
+    uz_status (*read)(abaqus_deck *d, const abaqus_keyword *keyword);
+    const char *text; /* without it: what is told of one that is left out */
 } KEYWORDS[] = {
-    {"AMPLITUDE", read_amplitude, false, NULL},
-    {"MATERIAL", read_material, false, NULL},
-    {"ELASTIC", read_elastic, false, NULL},
-    {"DENSITY", read_density, false, NULL},
-    {"EXPANSION", read_expansion, false, NULL},
-    {"SOLID SECTION", read_section, false, NULL},
-    {"ELEMENT", read_element_types, false, NULL},
-    {"BOUNDARY", read_boundary, false, NULL},
-    {"CLOAD", read_cload, false, NULL},
-    {"DLOAD", read_dload, false, NULL},
-    {"DSLOAD", read_dsload, false, NULL},
-    {"TEMPERATURE", read_temperature, false, NULL},
-    {"INITIAL CONDITIONS", read_initial, false, NULL},
-    {"CONTACT PAIR", read_pair, false, NULL},
-    {"TIE", read_tie, false, NULL},
-    {"SURFACE INTERACTION", read_interaction, false, NULL},
-    {"SURFACE BEHAVIOR", read_behavior, false, NULL},
-    {"FRICTION", read_friction, false, NULL},
-    {"STEP", read_step, false, NULL},
-    {"STATIC", read_static, false, NULL},
-    {"NODE", NULL, true, NULL},
-    {"NSET", NULL, true, NULL},
-    {"ELSET", NULL, true, NULL},
-    {"SURFACE", NULL, true, NULL},
-    {"RIGID BODY", NULL, true, NULL}, /* read ahead */
-    {"HEADING", NULL, true, NULL},
-    {"END STEP", NULL, true, NULL},
-    {"PART", NULL, true, NULL},
-    {"END PART", NULL, true, NULL},
-    {"ASSEMBLY", NULL, true, NULL},
-    {"END ASSEMBLY", NULL, true, NULL},
-    {"INSTANCE", NULL, true, NULL},
-    {"END INSTANCE", NULL, true, NULL},
-    {"NODE PRINT", NULL, false, NULL},
-    {"NODE FILE", NULL, false, NULL},
-    {"NODE OUTPUT", NULL, false, NULL},
-    {"EL PRINT", NULL, false, NULL},
-    {"EL FILE", NULL, false, NULL},
-    {"ELEMENT OUTPUT", NULL, false, NULL},
-    {"CONTACT PRINT", NULL, false, NULL},
-    {"CONTACT FILE", NULL, false, NULL},
-    {"CONTACT OUTPUT", NULL, false, NULL},
-    {"FACE PRINT", NULL, false, NULL},
-    {"SECTION PRINT", NULL, false, NULL},
-    {"OUTPUT", NULL, false, NULL},
-    {"FILE FORMAT", NULL, false, NULL},
-    {"FILTER", NULL, false, NULL},
-    {"PREPRINT", NULL, false, NULL},
-    {"MONITOR", NULL, false, NULL},
-    {"PRINT", NULL, false, NULL},
-    {"RESTART", NULL, false, NULL},
-    {"CONTROLS", NULL, false, NULL},
-    {"TIME POINTS", NULL, false, NULL},
-    {"ORIENTATION", NULL, false, NULL},
-    {"CONDUCTIVITY", NULL, false, NULL},
-    {"SPECIFIC HEAT", NULL, false, NULL},
-    {"GAP CONDUCTANCE", NULL, false, NULL},
-    {"CONTACT DAMPING", NULL, false, NULL},
-    {"DAMPING", NULL, false, NULL},
-    {"PHYSICAL CONSTANTS", NULL, false, NULL},
-    {"SHELL SECTION", NULL, false, "shells are not modelled, and are left out; their stiffness is not in the answer"},
-    {"BEAM SECTION", NULL, false, "beams are not modelled, and are left out; their stiffness is not in the answer"},
-    {"MEMBRANE SECTION", NULL, false,
-     "membranes are not modelled, and are left out; their stiffness is not in the answer"},
-    {"EQUATION", NULL, false, "equations between displacements are left out"},
-    {"MPC", NULL, false, "constraints between displacements are left out"},
-    {"TRANSFORM", NULL, false, "directions of nodes along other axes are left out: they are those of the file"},
-    {"CYCLIC SYMMETRY MODEL", NULL, false,
-     "cyclic symmetry is left out; give the whole ring, or hold planes of symmetry"},
-    {"PRE-TENSION SECTION", NULL, false, "the pretension is left out"},
-    {"MODEL CHANGE", NULL, false, "contact pairs and elements are not taken away or added"},
+    {"AMPLITUDE", read_amplitude, NULL},
+    {"MATERIAL", read_material, NULL},
+    {"ELASTIC", read_elastic, NULL},
+    {"DENSITY", read_density, NULL},
+    {"EXPANSION", read_expansion, NULL},
+    {"SOLID SECTION", read_section, NULL},
+    {"ELEMENT", read_element_types, NULL},
+    {"BOUNDARY", read_boundary, NULL},
+    {"CLOAD", read_cload, NULL},
+    {"DLOAD", read_dload, NULL},
+    {"DSLOAD", read_dsload, NULL},
+    {"TEMPERATURE", read_temperature, NULL},
+    {"INITIAL CONDITIONS", read_initial, NULL},
+    {"CONTACT PAIR", read_pair, NULL},
+    {"TIE", read_tie, NULL},
+    {"SURFACE INTERACTION", read_interaction, NULL},
+    {"SURFACE BEHAVIOR", read_behavior, NULL},
+    {"FRICTION", read_friction, NULL},
+    {"STEP", read_step, NULL},
+    {"STATIC", read_static, NULL},
+    {"SHELL SECTION", NULL, "shells are not modelled, and are left out; their stiffness is not in the answer"},
+    {"BEAM SECTION", NULL, "beams are not modelled, and are left out; their stiffness is not in the answer"},
+    {"MEMBRANE SECTION", NULL, "membranes are not modelled, and are left out; their stiffness is not in the answer"},
+    {"EQUATION", NULL, "equations between displacements are left out"},
+    {"MPC", NULL, "constraints between displacements are left out"},
+    {"TRANSFORM", NULL, "directions of nodes along other axes are left out: they are those of the file"},
+    {"CYCLIC SYMMETRY MODEL", NULL, "cyclic symmetry is left out; give the whole ring, or hold planes of symmetry"},
+    {"PRE-TENSION SECTION", NULL, "the pretension is left out"},
+    {"MODEL CHANGE", NULL, "contact pairs and elements are not taken away or added"},
 };
 enum { N_KEYWORDS = sizeof KEYWORDS / sizeof KEYWORDS[0] };
+
+/* Parts of the mesh, what is read ahead, and brackets: nothing is to be told. */
+static const char *const SILENT[] = {"NODE",         "NSET",     "ELSET",       "SURFACE",  "RIGID BODY",
+                                     "HEADING",      "END STEP", "PART",        "END PART", "ASSEMBLY",
+                                     "END ASSEMBLY", "INSTANCE", "END INSTANCE"};
+
+/* They say nothing about the answer. */
+static const char *const IRRELEVANT[] = {
+    "NODE PRINT",      "NODE FILE",    "NODE OUTPUT",       "EL PRINT",     "EL FILE",       "ELEMENT OUTPUT",
+    "CONTACT PRINT",   "CONTACT FILE", "CONTACT OUTPUT",    "FACE PRINT",   "SECTION PRINT", "OUTPUT",
+    "FILE FORMAT",     "FILTER",       "PREPRINT",          "MONITOR",      "PRINT",         "RESTART",
+    "CONTROLS",        "TIME POINTS",  "ORIENTATION",       "CONDUCTIVITY", "SPECIFIC HEAT", "GAP CONDUCTANCE",
+    "CONTACT DAMPING", "DAMPING",      "PHYSICAL CONSTANTS"};
+
+#define IS_AMONG(keyword, list) is_among(keyword, list, sizeof(list) / sizeof(list)[0])
+static bool is_among(const abaqus_keyword *keyword, const char *const *list, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (abaqus_keyword_is(keyword, list[i]))
+            return true;
+    return false;
+}
 
 static uz_status read_block(abaqus_deck *d)
 {
@@ -939,18 +918,18 @@ static uz_status read_block(abaqus_deck *d)
         at++;
     if (at < N_KEYWORDS && KEYWORDS[at].read)
         return KEYWORDS[at].read(d, &keyword);
-    if (at == N_KEYWORDS && is_procedure(&keyword))
+    const bool silent = IS_AMONG(&keyword, SILENT), irrelevant = IS_AMONG(&keyword, IRRELEVANT);
+    if (at == N_KEYWORDS && !silent && !irrelevant && is_procedure(&keyword))
         return abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED, "the first step is *%.40s; a scene is a *STATIC one",
                            keyword.text);
     skip_data(d);
-    if (at == N_KEYWORDS)
-        return deck_note(d, keyword.line, keyword.text, UZ_DECK_LEFT_OUT,
-                         "a scene has no word for it, and it is left out");
-    if (KEYWORDS[at].silent)
+    if (silent)
         return UZ_OK;
-    return KEYWORDS[at].text ? deck_note(d, keyword.line, keyword.text, UZ_DECK_LEFT_OUT, "%s", KEYWORDS[at].text)
-                             : deck_note(d, keyword.line, keyword.text, UZ_DECK_IRRELEVANT,
-                                         "it says nothing about the answer of a static step");
+    if (irrelevant)
+        return deck_note(d, keyword.line, keyword.text, UZ_DECK_IRRELEVANT,
+                         "it says nothing about the answer of a static step");
+    return deck_note(d, keyword.line, keyword.text, UZ_DECK_LEFT_OUT, "%s",
+                     at < N_KEYWORDS ? KEYWORDS[at].text : "a scene has no word for it, and it is left out");
 }
 
 uz_status deck_read_lines(abaqus_deck *d)
