@@ -10,6 +10,17 @@
 #include <string.h>
 #include <sys/mman.h>
 
+/* Of a cube of hex8 that an obstacle is under. */
+static const uz_cost_size BODY = {.d = 100000,
+                                  .m = 1000,
+                                  .n_b = 1000,
+                                  .k_entries = 4100000,
+                                  .n_entries = 1000,
+                                  .modes = 6,
+                                  .active_set = true,
+                                  .bounds = true,
+                                  .cases = 1};
+
 /* A solid of hex8 under few rows. */
 static bool is_surely_free(uz_cost_plan *plan, int64_t nx, int64_t ny, int64_t nz, uz_operator asked, size_t limit)
 {
@@ -155,15 +166,8 @@ TEST(patience_is_as_long_as_a_factor_is_dear)
 TEST(further_loads_cost_less_without_a_factor)
 {
     const uz_factor_info factor = {.nnz = 40000000, .flops = 1e11, .bytes = 320000000};
-    const uz_cost_size size = {.d = 100000,
-                               .m = 1000,
-                               .n_b = 1000,
-                               .k_entries = 4100000,
-                               .n_entries = 1000,
-                               .modes = 6,
-                               .active_set = true,
-                               .bounds = true,
-                               .cases = 50};
+    uz_cost_size size = BODY;
+    size.cases = 50;
     uz_cost_plan plan;
     uz_cost_decide(&plan, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
     CHECK(plan.count > 1);
@@ -189,18 +193,10 @@ static double seconds_without_factor(uz_cost_size size)
 TEST(what_is_harder_costs_more)
 {
     for (int cells = 0; cells < 2; cells++) {
-        const uz_cost_size plain = {.d = 100000,
-                                    .m = 1000,
-                                    .n_b = 1000,
-                                    .k_entries = 4100000,
-                                    .n_entries = 1000,
-                                    .modes = 6,
-                                    .active_set = true,
-                                    .bounds = true,
-                                    .by_cells = cells ? 2e7 : 0.0,
-                                    .stretch = 1.8,
-                                    .firmness = 1.0,
-                                    .cases = 1};
+        uz_cost_size plain = BODY;
+        plain.by_cells = cells ? 2e7 : 0.0;
+        plain.stretch = 1.8;
+        plain.firmness = 1.0;
         uz_cost_size larger = plain, firmer = plain, longer = plain, slender = plain, more = plain, easier = plain;
         larger.d *= 2;
         larger.k_entries *= 2;
@@ -222,15 +218,7 @@ TEST(what_is_harder_costs_more)
 /* Entries that come from memory have a rate of their own, which is K's. */
 TEST(a_large_K_has_its_own_rate)
 {
-    uz_cost_size size = {.d = 100000,
-                         .m = 1000,
-                         .n_b = 1000,
-                         .k_entries = 4100000,
-                         .n_entries = 1000,
-                         .modes = 6,
-                         .active_set = true,
-                         .bounds = true,
-                         .cases = 1};
+    uz_cost_size size = BODY;
     size.cycle_s = 1e-12; /* nothing */
     const double base = seconds_without_factor(size);
     size.entry_s = 3.0 * uz_cost_machine()->entry_s;
