@@ -19,6 +19,12 @@ static void read_reply(json_tree *doc, char *reply, const char *schema)
     schemas_free(all);
 }
 
+static void drop(json_tree *doc, char *reply)
+{
+    json_clear(doc);
+    free(reply);
+}
+
 /* The number at "a/b/c" of a document, NaN for null. */
 static double number_at(const json_tree *doc, const char *place)
 {
@@ -112,14 +118,12 @@ TEST(problem)
     CHECK_STR(text_at(&doc, "detail"), "say \"x\"");
     CHECK(json_get(doc.root, "pointer") != NULL); /* the whole request */
     CHECK(number_at(&doc, "line") == 3 && number_at(&doc, "status") == 422);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     problem = (problem_details){.status = 404, .code = "not_found"};
     reply = codec_encode_problem(&problem);
     read_reply(&doc, reply, "problem-details.json");
     CHECK(!json_get(doc.root, "pointer") && !json_get(doc.root, "line"));
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 static uz_summary paper_summary(void)
@@ -217,8 +221,7 @@ TEST(summary_of_a_scene)
     const json_value *reused = json_get(json_get(doc.root, "factor"), "reused");
     CHECK(is_false(json_get(reused, "assembly")) && json_truth(json_get(reused, "ordering")));
     CHECK(json_truth(json_get(reused, "factor")) && is_false(json_get(reused, "operator")));
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 TEST(summary_of_a_body_held_by_contact)
@@ -228,8 +231,7 @@ TEST(summary_of_a_body_held_by_contact)
     char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     read_reply(&doc, reply, "summary.json");
     CHECK(!json_get(doc.root, "semicoercive"));
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     s.semicoercive = (uz_semicoercive){.free_modes = 2, .held = 9, .held_by = {3, 5, 6, 7, 8, 9, 10, 12}, .rounds = 4};
     reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     read_reply(&doc, reply, "summary.json");
@@ -237,8 +239,7 @@ TEST(summary_of_a_body_held_by_contact)
     CHECK(number_at(&doc, "semicoercive/rounds") == 4);
     const json_value *rows = json_get(json_get(doc.root, "semicoercive"), "held_by_rows");
     CHECK(json_size(rows) == 8 && rows->numbers[7] == 12);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 TEST(summary_of_matrices)
@@ -253,8 +254,7 @@ TEST(summary_of_matrices)
     CHECK(!json_get(contact, "force") && !json_get(contact, "max_pressure"));
     CHECK_STR(text_at(&doc, "outcome"), "precision_limit");
     CHECK_STR(text_at(&doc, "message"), "reached 1e-9");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 TEST(numbers_and_texts_of_a_summary_are_read_back)
@@ -285,8 +285,7 @@ TEST(what_accuracy_took_fits_the_schema)
     char *reply = codec_encode_trade(&of, NULL);
     read_reply(&doc, reply, "work-precision.json");
     CHECK(json_is(json_get(doc.root, "mesh_error"), JSON_IS_NULL));
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     for (int k = 0; k < 30; k++)
         of.trade.step[k] = (uz_trade_step){.seconds = 0.01 * k, .iterations = 10 * k, .by_certificate = k > 27};
     of.trade.iterated_s = 0.29;
@@ -302,8 +301,7 @@ TEST(what_accuracy_took_fits_the_schema)
     CHECK_STR(json_text(json_get(second, "by")), "iteration");
     CHECK(json_is(json_get(eighth, "seconds"), JSON_IS_NULL) && json_is(json_get(eighth, "by"), JSON_IS_NULL));
     CHECK_INT(json_number(json_get(&levels->items[1], "iterations"), 0), 100); /* 2e-3 is met at 10^-2.75 */
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 TEST(every_outcome_fits_the_schema)
@@ -314,8 +312,7 @@ TEST(every_outcome_fits_the_schema)
         s.outcome = (uz_outcome)i;
         char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
         read_reply(&doc, reply, "summary.json");
-        json_clear(&doc);
-        free(reply);
+        drop(&doc, reply);
     }
 }
 
@@ -336,25 +333,21 @@ TEST(jobs)
     CHECK_STR(text_at(&doc, "status"), "successful");
     CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.250Z");
     CHECK_INT(json_size(json_get(doc.root, "links")), 4);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     reply = codec_encode_job(&list[1]);
     read_reply(&doc, reply, "job.json");
     CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.000Z"); /* rounding carries into the second */
     CHECK(json_is(json_get(doc.root, "started"), JSON_IS_NULL) && json_is(json_get(doc.root, "summary"), JSON_IS_NULL));
     CHECK_INT(json_size(json_get(doc.root, "links")), 1);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     reply = codec_encode_jobs(list, 2, true);
     read_reply(&doc, reply, "jobs.json");
     CHECK_STR(text_at(&doc, "next"), "0193ab");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     reply = codec_encode_jobs(NULL, 0, false);
     read_reply(&doc, reply, "jobs.json");
     CHECK(json_is(json_get(doc.root, "next"), JSON_IS_NULL));
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     free(list[0].summary);
     free(list[1].error);
 }
@@ -367,13 +360,11 @@ TEST(service)
     char *reply = codec_encode_factors(entries, 2, 1 << 30);
     read_reply(&doc, reply, "factors.json");
     CHECK(number_at(&doc, "bytes") == 123 && number_at(&doc, "max_bytes") == 1 << 30);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     reply = codec_encode_health("ok", (int64_t[5]){1, 2, 3, 4, 5}, 2);
     read_reply(&doc, reply, "health.json");
     CHECK(number_at(&doc, "jobs/accepted") == 1 && number_at(&doc, "jobs/dismissed") == 5);
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }
 
 TEST(result)
@@ -399,8 +390,7 @@ TEST(result)
     CHECK(strstr(reply, "\"reactions\":[-0.1,0],\"gaps\":[0,null],\"displacements\":[[1,2],[3,0.5]],\"nodes\":[[1,2],"
                         "[3,0.5]],\"contact_nodes\":[0,1]}"));
     read_reply(&doc, reply, "result.json");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     result.dim = 0;
     result.reactions = NULL;
     result.nodes = NULL;
@@ -408,8 +398,7 @@ TEST(result)
     CHECK(strstr(reply, "\"displacements\":[1,2,3,0.5]") && !strstr(reply, "reactions\"") &&
           !strstr(reply, "nodes\":[["));
     read_reply(&doc, reply, "result.json");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     free(summary);
 }
 
@@ -433,14 +422,12 @@ TEST(history)
     CHECK_INT(len, strlen(reply));
     CHECK(strstr(reply, "\"rows\":[[7,0.5,-1,1,2,3,4,5,6,null,8,1],[7,0.5,-1,1,2,3,4,5,6,0.25,8,1]]"));
     read_reply(&doc, reply, "history.json");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
     reply = codec_encode_history_csv(rows, 2, &len);
     CHECK_STR(reply, "iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound,contacts,"
                      "restart\n7,0.5,-1,1,2,3,4,5,6,inf,8,1\n7,0.5,-1,1,2,3,4,5,6,0.25,8,1\n");
     free(reply);
     reply = codec_encode_history(NULL, rows, 0, &len);
     read_reply(&doc, reply, "history.json");
-    json_clear(&doc);
-    free(reply);
+    drop(&doc, reply);
 }

@@ -90,21 +90,26 @@ static void claim_share(store *s, bool small, char (*ids)[33], char *out)
     free(body);
 }
 
+static void check_next(store *s, bool small, char (*ids)[33], const char *who)
+{
+    char out[2];
+    claim_share(s, small, ids, out);
+    CHECK_STR(out, who);
+}
+
 /* One that comes goes before those of whom something runs, and at the next turn before those who have had more. */
 STORE_TEST(who_has_had_least_goes_first)
 {
     static const char *const SHARES[] = {"many", "many", "many", "many", "one", "other"};
     place p;
-    char id[26][33] = {""}, who[2];
+    char id[26][33] = {""};
     if (!place_begin(&p))
         return;
     for (int i = 0; i < 4; i++)
         submit_with(p.s, (store_request){.share = SHARES[i]}, id[i]);
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "a");
+    check_next(p.s, false, id, "a");
     submit_with(p.s, (store_request){.share = SHARES[4]}, id[4]);
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "e");
+    check_next(p.s, false, id, "e");
     sleep_s(0.05);
     CHECK_INT(finish_as(p.s, id[0], "me", &PLAIN_SUCCESS), STORE_OK);
     CHECK_INT(finish_as(p.s, id[4], "me", &PLAIN_SUCCESS), STORE_OK);
@@ -121,8 +126,7 @@ STORE_TEST(who_has_had_least_goes_first)
                   (first[0] == 'g' || second[0] == 'g' || third[0] == 'g') &&
                   (first[0] == 'b' || second[0] == 'b' || third[0] == 'b'),
               "each of three has one of three turns: %s%s%s", first, second, third);
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "c"); /* in their order of age */
+    check_next(p.s, false, id, "c"); /* in their order of age */
     check_counts(p.s, 1, 4, 2, 0, 0);
     place_end(&p);
 }
@@ -163,13 +167,11 @@ STORE_TEST(a_run_that_is_put_back_was_a_turn)
             return;
         for (int i = 0; i < 4; i++)
             submit_with(p.s, (store_request){.share = i % 2 ? "b" : "a", .small = true}, id[i]);
-        claim_share(p.s, true, id, who);
-        CHECK_STR(who, "a");
+        check_next(p.s, true, id, "a");
         sleep_s(held);
         CHECK_INT(release_as(p.s, id[0], "me"), STORE_OK);
         const double begun = clock_seconds(CLOCK_MONOTONIC);
-        claim_share(p.s, true, id, who);
-        CHECK_STR(who, "b");
+        check_next(p.s, true, id, "b");
         CHECK_INT(finish_as(p.s, id[1], "me", &PLAIN_SUCCESS), STORE_OK);
         shorter = clock_seconds(CLOCK_MONOTONIC) - begun < held;
         claim_share(p.s, true, id, who);
@@ -263,10 +265,8 @@ STORE_TEST(what_goes_before_all_shares)
     submit_with(p.s, (store_request){.share = "x", .priority = 6}, id[2]);
     submit_with(p.s, (store_request){.share = "x", .priority = 7}, id[3]);
     static const char *const ORDER[] = {"d", "c"};
-    for (int i = 0; i < 2; i++) {
-        claim_share(p.s, false, id, who);
-        CHECK_STR(who, ORDER[i]);
-    }
+    for (int i = 0; i < 2; i++)
+        check_next(p.s, false, id, ORDER[i]);
     char other[2];
     claim_share(p.s, false, id, who);
     claim_share(p.s, false, id, other);
@@ -277,23 +277,18 @@ STORE_TEST(what_goes_before_all_shares)
 STORE_TEST(small_jobs_by_themselves)
 {
     place p;
-    char id[26][33] = {""}, who[2];
+    char id[26][33] = {""};
     if (!place_begin(&p))
         return;
     submit_with(p.s, (store_request){.share = "x", .priority = 3}, id[0]);
     submit_with(p.s, (store_request){.share = "x", .small = true}, id[1]);
     submit_with(p.s, (store_request){.share = "x", .small = true, .priority = 1}, id[2]);
-    claim_share(p.s, true, id, who);
-    CHECK_STR(who, "c");
+    check_next(p.s, true, id, "c");
     CHECK_INT(release_as(p.s, id[2], "me"), STORE_OK); /* it was not small */
-    claim_share(p.s, true, id, who);
-    CHECK_STR(who, "b");
-    claim_share(p.s, true, id, who);
-    CHECK_STR(who, "");
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "a");
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "c");
+    check_next(p.s, true, id, "b");
+    check_next(p.s, true, id, "");
+    check_next(p.s, false, id, "a");
+    check_next(p.s, false, id, "c");
     check_counts(p.s, 0, 3, 0, 0, 0);
     place_end(&p);
 }
@@ -301,16 +296,14 @@ STORE_TEST(small_jobs_by_themselves)
 STORE_TEST(a_share_whose_jobs_are_all_too_late_is_passed_over)
 {
     place p;
-    char id[26][33] = {""}, who[2];
+    char id[26][33] = {""};
     if (!place_begin(&p))
         return;
     submit_with(p.s, (store_request){.share = "a", .queue_limit_s = 0.01}, id[0]);
     submit_with(p.s, (store_request){.share = "b"}, id[1]);
     sleep_s(0.05);
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "b");
-    claim_share(p.s, false, id, who);
-    CHECK_STR(who, "");
+    check_next(p.s, false, id, "b");
+    check_next(p.s, false, id, "");
     place_end(&p);
 }
 
