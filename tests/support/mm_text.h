@@ -21,7 +21,7 @@ static inline void mm_put_matrix(FILE *out, const uz_csc *A, uz_mm_symmetry symm
             symmetry == UZ_MM_SYMMETRIC ? "symmetric" : "general", A->rows, A->cols, A->ptr[A->cols]);
     for (int64_t j = 0; j < A->cols; j++)
         for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
-            fprintf(out, "%" PRId64 " %" PRId64 " ", A->idx[k] + 1, j + 1);
+            fprintf(out, "%" PRId64 " %" PRId64 " ", (int64_t)A->idx[k] + 1, j + 1);
             mm_put_number(out, A->val[k]);
         }
 }
