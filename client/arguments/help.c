@@ -1,7 +1,6 @@
 /* help.c: the table of commands as pages for a terminal. */
 #include "arguments/commands.h"
 
-
 #define WIDTH  96 /* characters of a line */
 #define INDENT 23 /* where explanations of options begin */
 

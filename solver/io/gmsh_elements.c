@@ -3,7 +3,6 @@
 
 #include "core/alloc.h"
 
-
 #define LOWER       "set Mesh.ElementOrder = 1 or 2"
 #define SERENDIPITY "set Mesh.SecondOrderIncomplete = 1 for quadrilaterals of 8 nodes, or Mesh.ElementOrder = 1 for 4"
 #define INCOMPLETE                                                                                                     \

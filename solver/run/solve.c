@@ -13,7 +13,6 @@
 #include "run/finite.h"
 #include "run/problem.h"
 
-
 /* Are the cells of a box, or the elements to be bisected, chosen by the error asked for? */
 static bool is_mesh_chosen(const uz_problem *problem)
 {

@@ -3,7 +3,6 @@
 #include "bench/bench.h"
 #include "core/clock.h"
 
-
 enum { SIDE = 98, RUNS = 5 };
 
 /* Bounds on the dofs as the rows of the problem say them; u starts at the nearest point to zero. */

@@ -4,7 +4,6 @@
 
 #include "qp_fixture.h"
 
-
 /* K (d x d row-major, taken over), a bound of 0.5 from above on every third dof, a unit load. */
 static uz_qp bounded(double *K, int64_t d, double load)
 {

@@ -7,7 +7,6 @@
 #include "sanitized.h"
 #include "scene_fixture.h"
 
-
 __attribute__((constructor)) static void settle_threads(void)
 {
     uz_process_init(2);
