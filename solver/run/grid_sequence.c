@@ -58,6 +58,12 @@ enum { FEW_LINEAR = 64, FEW_QUADRATIC = 16 };
  */
 #define MOST_RELEASED 2.0
 
+/* What grids released is held against an estimate that fell to this part of its square by then; of two grids that are
+ * hardly different it is noise. An estimate that hides more than it does beside corners (docs/theory.md) is one of
+ * another answer, as where the coarser grid had not seen a contact. */
+#define FALLEN      0.5
+#define MOST_HIDDEN 2.25
+
 /* Why no further grid was tried. */
 typedef enum {
     STOP_NOT,
@@ -82,6 +88,7 @@ typedef struct {
     grid on;
     double error; /* the largest total error of all cases that have an answer */
     bool doubted; /* refined: that is an estimate of few elements, and no finer grid has confirmed it */
+    int number;   /* of the grid, from 0 */
 } answers;
 
 /* What one grid has of numbers that nothing bounds, of one case. */
@@ -89,8 +96,11 @@ typedef struct {
     double max_pressure, contact_area;
     double peak_size, mean_size; /* of sides at the peak, and of all that touch; 0: nothing does */
     uz_trend_point von_mises, used;
-    double potential, most_released; /* energy of the answer; what it may lose if the estimate is worth having */
-    double low, high;                /* of the quantity that is asked for, if one is */
+    double potential;    /* energy of the answer */
+    double missed, left; /* half the squares of what the mesh and the equations are off by, by estimate */
+    double moved;        /* the same of the distance from the answer of the coarser grid `from` */
+    int from;            /* -1: none */
+    double low, high;    /* of the quantity that is asked for, if one is */
 } seen;
 
 /* The search for the grid. */
@@ -285,29 +295,31 @@ static double equations_asked(const search *g)
     return g->settings->quantity_error > 0.0 ? uz_settings_default().relative_error : ALGEBRAIC_SHARE * g->requested;
 }
 
+static bool is_large(const uz_summary *s)
+{
+    return s->geometry.kind == UZ_KINEMATICS_FINITE;
+}
+
 static seen seen_of(const search *g, const uz_summary *s)
 {
     const uz_evaluation *e = s->evaluation;
     const double mesh = fmin(1.0, s->discretization_error * s->discretization_error), left = equations_asked(g);
-    const bool asked = e->asked > 0.0 && e->n_quantities > 0;
+    const bool asked = e->asked > 0.0 && e->n_quantities > 0, part = is_large(s) && s->finite.load < 1;
     return (seen){.max_pressure = s->max_pressure,
                   .contact_area = e->contact_area,
                   .peak_size = e->peak_size,
                   .mean_size = s->active > 0 ? pow(e->contact_area / (double)s->active, 1.0 / (s->dim - 1)) : 0.0,
                   .von_mises = {e->von_mises.size, e->von_mises.value},
                   .used = {e->used.size, e->used.value},
-                  .potential = e->potential_energy,
-                  .most_released = e->strain_energy * (MOST_RELEASED * mesh / (1.0 - mesh) + left * left),
+                  .potential = part ? (double)NAN : e->potential_energy,
+                  .missed = part ? (double)NAN : e->strain_energy * mesh / (1.0 - mesh),
+                  .left = e->strain_energy * left * left,
+                  .from = -1,
                   .low = asked ? e->quantities[0].low : -INFINITY,
                   .high = asked ? e->quantities[0].high : (double)INFINITY};
 }
 
 /* ---- what answers are worth */
-
-static bool is_large(const uz_summary *s)
-{
-    return s->geometry.kind == UZ_KINEMATICS_FINITE;
-}
 
 /* Is there an answer, and one of the scene as it is asked for? */
 static bool is_answered(const uz_summary *s)
@@ -338,7 +350,62 @@ static double left_of(const uz_summary *s)
 /* Does the next grid, of all elements divided, say that the estimate of this one was too small? */
 static bool refuted(const seen *of, const seen *finer)
 {
-    return of->potential - finer->potential > of->most_released || finer->low > of->high || finer->high < of->low;
+    return of->potential - finer->potential > MOST_RELEASED * of->missed + of->left || finer->low > of->high ||
+           finer->high < of->low;
+}
+
+/* How much of the square of an error the estimate hides. Answers are projections on what their grids can do, each of
+ * which the next one can: the squares of their distances sum up, and are what the square of the error fell by. now: of
+ * the last grid. 1 where nothing is hidden, or nothing is known. */
+static double hidden_by(const seen *all, const seen *now)
+{
+    double fell = 0;
+    const seen *at = now;
+    while (at->from >= 0 && !(now->missed <= FALLEN * at->missed)) {
+        fell += at->moved;
+        at = all + at->from;
+    }
+    const double hidden = now->missed <= FALLEN * at->missed ? fell / (at->missed - now->missed) : 1;
+    return hidden > 1 ? fmin(hidden, MOST_HIDDEN) : 1;
+}
+
+/* Is what a grid can do part of what the next one can? Not of elements whose strain is not that of the displacement. */
+static bool is_nested(const uz_body_model *body)
+{
+    bool nested = true;
+    for (int64_t e = 0; e < body->mesh.n_elements && nested; e++)
+        nested = uz_element_formulation(body, e) == UZ_FORMULATION_STANDARD;
+    return nested;
+}
+
+/* Half the square of the distance of an answer from that of a coarser grid. */
+static uz_status measure_move(double *moved, const uz_result *here, const uz_result *coarse, const uz_body_model *body,
+                              uz_error *err)
+{
+    const int64_t n = body->mesh.n_nodes * body->mesh.dim;
+    double *u = uz_carry_nodal(&body->mesh, coarse->u, coarse->n_nodes, body->mesh.dim);
+    if (!u)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare the answers of two grids");
+    for (int64_t i = 0; i < n; i++)
+        u[i] = here->u[i] - u[i];
+    const uz_status status = uz_strain_energy(moved, body, u, false, err);
+    free(u);
+    return status;
+}
+
+/* The estimate of a case becomes what the distances from coarser grids make of it. */
+static uz_status take_hidden(uz_result *result, search *g, int64_t i, const uz_body_model *body, uz_error *err)
+{
+    seen *all = &g->seen[i * UZ_GRID_LEVELS], *now = &all[g->sequence.count];
+    uz_summary *s = &result->summary;
+    if (!g->refines || !g->best.results || isnan(now->missed) || isnan(all[g->best.number].missed) || !is_nested(body))
+        return UZ_OK;
+    const uz_status status = measure_move(&now->moved, result, g->best.results[i], body, err);
+    now->from = g->best.number;
+    const double whole = s->evaluation->strain_energy + now->missed, hidden = hidden_by(all, now);
+    if (status == UZ_OK && !s->guarantee.proved && hidden > 1)
+        s->discretization_error = sqrt(hidden * now->missed / (whole + (hidden - 1) * now->missed));
+    return status;
 }
 
 /* Whether an error that is small enough is still to be looked at: it is an estimate, and either there are few elements
@@ -413,9 +480,8 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
     settings.time_limit_s = fmax(0.0, g->deadline - started);
     if (!(x->results = uz_alloc_zero(g->n_cases, sizeof(uz_result *))))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
-    const uz_status status = uz_is_finite(problem)
-                                 ? solve_large(x->results, g, problem, &settings, &outline->mesh, err)
-                                 : solve_small(x->results, g, problem, &settings, outline, started, err);
+    uz_status status = uz_is_finite(problem) ? solve_large(x->results, g, problem, &settings, &outline->mesh, err)
+                                             : solve_small(x->results, g, problem, &settings, outline, started, err);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
         seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];
@@ -426,13 +492,17 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
                         .von_mises.value = NAN,
                         .used.value = NAN,
                         .potential = NAN,
-                        .most_released = NAN,
+                        .missed = NAN,
+                        .left = NAN,
+                        .from = -1,
                         .low = -INFINITY,
                         .high = INFINITY};
         if (!is_answered(s))
             continue;
-        if (s->evaluation)
+        if (s->evaluation) {
             *known = seen_of(g, s);
+            status = take_hidden(x->results[i], g, i, outline, err);
+        }
         x->error = fmax(x->error, error_of(g, s));
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
         level->certified_error = fmax(level->certified_error, left_of(s));
@@ -447,7 +517,7 @@ static uz_status solve_on_grid(answers *x, uz_grid_level *level, search *g, cons
     uz_problem problem = *g->problem;
     uz_body_model outline;
     const double start = uz_seconds();
-    *x = (answers){.on = *on};
+    *x = (answers){.on = *on, .number = g->sequence.count};
     *level = (uz_grid_level){.d = 0};
     if (on->n > 0 && !g->refines)
         memcpy(level->cells, on->box.cells, sizeof level->cells);
