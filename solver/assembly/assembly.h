@@ -271,6 +271,10 @@ bool uz_is_moved(const uz_body_model *model, const double *prescribed);
 /* Do loads of the scene act on free dofs, so that a body which is carried is deformed as well? Also where there is no
  * memory to tell. */
 bool uz_is_loaded(const uz_body_model *model, const uz_scene *scene);
+/* Do supports hold nodes farther apart, or closer, than rounding of what they move them by may? Then a body that is
+ * carried is strained as well. nodal: n_nodes x dim; large: the distances that nodes have then count, not those of
+ * infinitesimal rotation. */
+bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large);
 /* May rows h - N u press on a body that is carried to u (d)? One closes, or nears it more than what rounding of so long
  * a way hides. Also where there is no memory to tell. */
 bool uz_may_press(const uz_csc *N, const double *h, const double *u);

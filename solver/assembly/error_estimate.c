@@ -13,6 +13,7 @@
 #include "core/alloc.h"
 #include "core/vector3.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -129,32 +130,54 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 /* What solves leave of the way of a body that is only carried along, in parts of it. */
 #define CARRIED 1e-12
 
-/* Are the strains of each element no more than that part of the way of its nodes, over its least extent? So it is of a
- * body that is only rotated. Of rings the way is that along the axis, as the other one strains them. */
+/* What supports hold apart by more than this part of their way is no rounding of what they were given. */
+#define APART (4 * DBL_EPSILON)
+
+/* Motion that differs by less than this part between nodes: strain may have lost digits that count. */
+#define ALIKE 1e-6
+
+/* Energy of an element whose strain is that part of the way of its nodes over its least extent, and twice what it has;
+ * of rings the way is that along the axis, as the other one strains them. */
+static double energy_of_way(double *own, const uz_body_model *model, const double *nodal, int64_t e, double part)
+{
+    const int dim = model->mesh.dim, ring = model->kind == UZ_AXISYMMETRIC;
+    const int corners = uz_element_type_of((uz_element_kind)model->mesh.kind[e])->corners;
+    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], way = 0, least = INFINITY;
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    uz_element element;
+    uz_body_element(&element, xyz, model, e);
+    for (int i = 0; i < count * dim; i++) {
+        u[i] = nodal[node[i / dim] * dim + i % dim];
+        way = i % dim >= ring ? fmax(way, fabs(u[i])) : way;
+    }
+    for (int a = 0; a < corners; a++)
+        for (int b = 0; b < a; b++)
+            least = fmin(least, uz_distance2(xyz + a * dim, xyz + b * dim, dim));
+    const double strain = part * way / sqrt(least);
+    *own = 2 * uz_element_strain_energy(&element, u);
+    return uz_most_stiffness(element.lame) * uz_element_volume(&element) * strain * strain;
+}
+
+/* Has each element no more than that? So it is of a body that is only rotated. */
 static bool is_carried(const uz_body_model *model, const double *nodal)
 {
-    const uz_mesh *mesh = &model->mesh;
-    const int dim = mesh->dim, ring = model->kind == UZ_AXISYMMETRIC;
     bool carried = true;
-    for (int64_t e = 0; e < mesh->n_elements && carried; e++) {
-        const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
-        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], way = 0, least = INFINITY;
-        int count;
-        const int64_t *node = uz_mesh_element(mesh, e, &count);
-        uz_element element;
-        uz_body_element(&element, xyz, model, e);
-        for (int i = 0; i < count * dim; i++) {
-            u[i] = nodal[node[i / dim] * dim + i % dim];
-            way = i % dim >= ring ? fmax(way, fabs(u[i])) : way;
-        }
-        for (int a = 0; a < corners; a++)
-            for (int b = 0; b < a; b++)
-                least = fmin(least, uz_distance2(xyz + a * dim, xyz + b * dim, dim));
-        const double strain = CARRIED * way / sqrt(least);
-        carried = 2 * uz_element_strain_energy(&element, u) <=
-                  uz_most_stiffness(element.lame) * uz_element_volume(&element) * strain * strain;
+    for (int64_t e = 0; e < model->mesh.n_elements && carried; e++) {
+        double own;
+        const double most = energy_of_way(&own, model, nodal, e, CARRIED);
+        carried = own <= most;
     }
     return carried;
+}
+
+/* What rounding of displacements makes of strains, in twice the energy. */
+static double energy_of_rounding(const uz_body_model *model, const double *nodal)
+{
+    double sum = 0, own;
+    for (int64_t e = 0; e < model->mesh.n_elements; e++)
+        sum += energy_of_way(&own, model, nodal, e, DBL_EPSILON);
+    return sum;
 }
 
 /* But for a part of its way. It strains nothing, unless along the radius of rings: what its strains come to is
@@ -171,6 +194,51 @@ static bool is_translation(const uz_body_model *model, const double *nodal, doub
     return so;
 }
 
+bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large)
+{
+    const int dim = model->mesh.dim;
+    const bool shifted = is_translation(model, nodal, CARRIED);
+    const double *first[3] = {NULL}, *whole = NULL, *from = NULL; /* what the first held node has, by axis or in all */
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        const double *u = nodal + a * dim, *x = model->mesh.xyz + a * dim;
+        double way = 0, along = 0, length2 = 0, motion2 = 0;
+        bool all = true;
+        if (uz_is_rigid(model, a) || uz_node_frame(model, a))
+            continue;
+        for (int c = 0; c < dim; c++) {
+            const int64_t j = model->dof[a * dim + c];
+            const bool held = j < 0 && j != UZ_NO_DOF;
+            all = all && held;
+            if (held && !first[c])
+                first[c] = u;
+            if (held && shifted && fabs(u[c] - first[c][c]) > APART * fabs(u[c]))
+                return true;
+        }
+        if (!all || shifted)
+            continue;
+        whole = whole ? whole : u;
+        from = from ? from : x;
+        for (int c = 0; c < dim; c++) { /* what the square of the distance to the first one grows by */
+            const double d = x[c] - from[c], e = u[c] - whole[c];
+            way = fmax(way, fabs(u[c]));
+            along += e * (2 * d + (large ? e : 0));
+            length2 += d * d;
+            motion2 += e * e;
+        }
+        if (fabs(along) > 2 * APART * way * (sqrt(length2) + sqrt(motion2)))
+            return true;
+    }
+    return false;
+}
+
+/* Does nothing strain the body, but rounding? */
+static bool nothing_strains(const uz_body_model *model, const uz_scene *scene, const double *nodal)
+{
+    const bool alone = model->m == 0; /* what presses on a body may be less than solves leave, as loads may */
+    return (is_translation(model, nodal, CARRIED) || (alone && is_carried(model, nodal))) &&
+           !uz_is_loaded(model, scene) && !uz_is_stretched(model, nodal, false);
+}
+
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal)
 {
@@ -181,10 +249,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
     if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
         return NAN;
-    const bool alone = scene && model->m == 0; /* what presses on a body may be less than solves leave, as loads may */
-    if (!free_strain && (is_translation(model, nodal, 0) ||
-                         (scene && (is_translation(model, nodal, CARRIED) || (alone && is_carried(model, nodal))) &&
-                          !uz_is_loaded(model, scene))))
+    if (!free_strain && (is_translation(model, nodal, 0) || (scene && nothing_strains(model, scene, nodal))))
         return 0;
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
     double *least = NULL, *own = NULL;
@@ -210,6 +275,8 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
     const double stressed = sqrt(sums.stress / sums.whole);
     if (stressed < FREE)
         return 0;
+    if (is_translation(model, nodal, ALIKE)) /* nor is what rounding left of strains known */
+        sums.eta2 += energy_of_rounding(model, nodal);
     if (share)
         *share = stressed;
     return sqrt(sums.eta2 / (sums.stress + sums.eta2));

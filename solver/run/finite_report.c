@@ -178,7 +178,8 @@ double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, boo
  * Each element by itself: soft ones have little energy beside what rounding makes of stiff ones. */
 static bool is_carried(const uz_finite_run *run)
 {
-    bool so = run->certificate.residual == 0 && run->certificate.unstrained && !uz_is_loaded(&run->base, &run->scene);
+    bool so = run->certificate.residual == 0 && run->certificate.unstrained && !uz_is_loaded(&run->base, &run->scene) &&
+              !uz_is_stretched(&run->base, run->at.u, true);
     for (int64_t i = 0; i < run->n_r && so; i++)
         so = !(run->r[i] < 0);
     return so;

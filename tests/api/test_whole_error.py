@@ -98,6 +98,24 @@ def test_a_pressure_at_a_corner_has_no_limit(s):
     check(line["result"] == "uncertain" and "unbounded" in line["reason"], line)
 
 
+def test_what_is_stretched_and_carried_far_has_an_error(s):
+    """It was told 0 where the stretch is less than 1e-12 of the way, as if it were rounding; what is given alike stays at 0."""
+    def told(way, by, kinematics, element):
+        ends = [{"on": "left", "ux": way, "uy": 0}, {"on": "right", "ux": way + by, "uy": 0}]
+        scene = {"kind": "scene", "model": "plane_strain", "kinematics": kinematics, "mesh": {"box": {"size": [2, 1], "cells": [4, 2], "element": element}},
+                 "materials": [{"on": "all", "young": 1, "poisson": 0.3, **({"law": "neo_hooke"} if kinematics == "finite" else {})}], "supports": ends}
+        return solved(s, {"problem": scene})["summary"]["error"]["mesh"]
+    for kinematics in ("fixed", "finite"):
+        for element in ("quad4", "tri3", "quad8"):
+            still = told(0, 1e-6, kinematics, element)
+            for by, part in ((1e-9, 0.02), (1e-10, 0.2)):
+                far = told(1e3, by, kinematics, element)
+                check(abs(far / still - 1) < part, kinematics, element, by, far, still)
+            # most of it is rounding
+            check(told(1e3, 1e-12, kinematics, element) > 0.2, kinematics, element)
+            check(told(1e3, 0, kinematics, element) == 0, kinematics, element)
+
+
 def labelled(kind, materials, young=lambda k: 1000):
     """A clamped plate or bar under an end load; element e is of material e % materials."""
     solid = kind in SOLID
