@@ -63,6 +63,9 @@ enum { FEW_LINEAR = 64, FEW_QUADRATIC = 16 };
  * another answer, as where the coarser grid had not seen a contact. */
 #define FALLEN      0.5
 #define MOST_HIDDEN 2.25
+/* Of large deformation: a finer grid whose estimated square is so many times that of the best one has gone to another
+ * equilibrium, or to one without a limit. */
+#define ANOTHER 4
 
 /* Why no further grid was tried. */
 typedef enum {
@@ -393,19 +396,36 @@ static uz_status measure_move(double *moved, const uz_result *here, const uz_res
     return status;
 }
 
-/* The estimate of a case becomes what the distances from coarser grids make of it. */
+/* No less than what this is half the square of. */
+static void raise_error(uz_summary *s, double square)
+{
+    const double least = sqrt(square / (s->evaluation->strain_energy + square));
+    if (!s->guarantee.proved)
+        s->discretization_error = fmax(s->discretization_error, least);
+}
+
+/* The estimate of a case becomes what the distances from coarser grids make of it, and that of the best of these is no
+ * less than its distance. */
 static uz_status take_hidden(uz_result *result, search *g, int64_t i, const uz_body_model *body, uz_error *err)
 {
     seen *all = &g->seen[i * UZ_GRID_LEVELS], *now = &all[g->sequence.count];
-    uz_summary *s = &result->summary;
     if (!g->refines || !g->best.results || isnan(now->missed) || isnan(all[g->best.number].missed) || !is_nested(body))
         return UZ_OK;
-    const uz_status status = measure_move(&now->moved, result, g->best.results[i], body, err);
+    uz_result *best = g->best.results[i];
+    const uz_status status = measure_move(&now->moved, result, best, body, err);
+    if (status != UZ_OK)
+        return status;
     now->from = g->best.number;
-    const double whole = s->evaluation->strain_energy + now->missed, hidden = hidden_by(all, now);
-    if (status == UZ_OK && !s->guarantee.proved && hidden > 1)
-        s->discretization_error = sqrt(hidden * now->missed / (whole + (hidden - 1) * now->missed));
-    return status;
+    raise_error(&result->summary, hidden_by(all, now) * now->missed);
+    raise_error(&best->summary, now->moved);
+    g->best.error = fmax(g->best.error, error_of(g, &best->summary));
+    return UZ_OK;
+}
+
+/* Has the answer of a case left those of coarser grids? */
+static bool is_another(const seen *all, const seen *now, const uz_summary *s)
+{
+    return is_large(s) && now->from >= 0 && now->missed > ANOTHER * all[now->from].missed;
 }
 
 /* Whether an error that is small enough is still to be looked at: it is an estimate, and either there are few elements
@@ -615,11 +635,18 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
                 g->stop = STOP_TIME;
             else if (is_answered(s) && !(left_of(s) < g->requested) && g->stop == STOP_NOT)
                 g->stop = STOP_ALGEBRA;
+            const seen *all = &g->seen[i * UZ_GRID_LEVELS], *now = &all[g->sequence.count - 1];
             if (g->stop == STOP_NOT && is_large(s) && s->finite.load < 1 && g->best.results &&
                 s->finite.load < g->best.results[i]->summary.finite.load + MORE_LOAD) {
                 g->stop = STOP_GRID;
                 snprintf(g->reason, sizeof g->reason, "the next grid bears %.3g of the load alone: %.20s",
                          s->finite.load, uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome));
+            } else if (g->stop == STOP_NOT && x.error > g->best.error && is_another(all, now, s)) {
+                g->stop = STOP_GRID;
+                snprintf(g->reason, sizeof g->reason,
+                         "a finer grid has another equilibrium, with an error of %.3g: a bifurcation, or strain "
+                         "without limit",
+                         s->discretization_error);
             }
         }
         keep_better(g, &x);
