@@ -51,20 +51,30 @@ static bool may_be_thin(const uz_body_model *model, const uz_scene *scene)
     return may && model->formulation == UZ_FORMULATION_INCOMPATIBLE && model->kind != UZ_AXISYMMETRIC;
 }
 
-/* Nodes at which more acts than loads by area: supports, springs, ties, contacts, forces. */
+static void mark_group(unsigned char *held, const uz_body_model *model, const uz_group *group)
+{
+    for (int64_t i = 0; group && i < uz_group_node_count(&model->mesh, group); i++)
+        held[uz_group_node_at(group, i)] = 1;
+}
+
+/* Nodes at which more acts than loads and springs by area: supports, springs of other groups, ties, contacts, forces.
+ */
 static void mark_held(unsigned char *held, const uz_body_model *model, const uz_scene *scene)
 {
     const int dim = model->mesh.dim;
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
         const int64_t j = model->dof[i];
-        if (j < 0 || (model->spring && model->spring[i] > 0) || (model->m > 0 && model->N.ptr[j + 1] > model->N.ptr[j]))
+        if (j < 0 || (model->m > 0 && model->N.ptr[j + 1] > model->N.ptr[j]))
             held[i / dim] = 1;
+    }
+    for (int64_t k = 0; k < scene->n_supports; k++) {
+        const bool spring = scene->supports[k].kind == UZ_SUPPORT_SPRING;
+        const uz_group *group = spring ? uz_mesh_group(&model->mesh, scene->supports[k].on, "", NULL) : NULL;
+        mark_group(held, model, group && group->kind != UZ_GROUP_FACES ? group : NULL);
     }
     for (int64_t k = 0; k < scene->n_loads; k++) {
         const uz_load *load = &scene->loads[k];
-        const uz_group *group = load->kind == UZ_LOAD_FORCE ? uz_mesh_group(&model->mesh, load->on, "", NULL) : NULL;
-        for (int64_t i = 0; group && i < uz_group_node_count(&model->mesh, group); i++)
-            held[uz_group_node_at(group, i)] = 1;
+        mark_group(held, model, load->kind == UZ_LOAD_FORCE ? uz_mesh_group(&model->mesh, load->on, "", NULL) : NULL);
         if (load->kind == UZ_LOAD_NODE_FORCE)
             held[load->node] = 1;
     }
@@ -96,6 +106,36 @@ static void add_loads(double *known, const uz_body_model *model, const uz_scene 
             known[group->face[i].element * UZ_ELEMENT_SIDES + group->face[i].side] +=
                 part * (load->kind == UZ_LOAD_PRESSURE ? -load->value : uz_dot3(n, load->v));
         }
+    }
+}
+
+/* ... and with what springs that are spread over sides pull at them, the body displaced by nodal. */
+static void add_springs(double *known, const uz_body_model *model, const uz_scene *scene, const double *nodal)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t k = 0; k < scene->n_supports; k++) {
+        const uz_support *support = &scene->supports[k];
+        const bool spring = support->kind == UZ_SUPPORT_SPRING;
+        const uz_group *group = spring ? uz_mesh_group(&model->mesh, support->on, "", NULL) : NULL;
+        double area = 0;
+        for (int pass = 0; pass < 2 && group && group->kind == UZ_GROUP_FACES; pass++) /* the whole area first */
+            for (int64_t i = 0; i < group->n_faces; i++) {
+                double xyz[3 * UZ_FACE_NODES], weight[UZ_FACE_NODES], n[3], pull = 0, own = 0;
+                int64_t node[UZ_FACE_NODES];
+                uz_side side;
+                uz_body_side(&side, xyz, node, model, group->face[i]);
+                uz_side_positive_weights(weight, &side);
+                normal_of(n, model, group->face[i]);
+                for (int a = 0; a < side.nodes; a++) {
+                    own += weight[a];
+                    for (int c = 0; c < dim; c++)
+                        pull -= weight[a] * support->spring[c] * nodal[node[a] * dim + c] * n[c];
+                }
+                if (pass == 0)
+                    area += own;
+                else
+                    known[group->face[i].element * UZ_ELEMENT_SIDES + group->face[i].side] += pull / (own * area);
+            }
     }
 }
 
@@ -252,7 +292,8 @@ static void take_stack(thin_elements *x, uz_face first)
     x->any = true;
 }
 
-static uz_status begin(thin_elements *x, unsigned char *held, const uz_scene *scene, double loads, uz_error *err)
+static uz_status begin(thin_elements *x, unsigned char *held, const uz_scene *scene, const double *nodal, double loads,
+                       uz_error *err)
 {
     const uz_status status = uz_corner_table_build(&x->sides, &x->model->mesh, true, err);
     if (status != UZ_OK)
@@ -260,6 +301,7 @@ static uz_status begin(thin_elements *x, unsigned char *held, const uz_scene *sc
     mark_held(held, x->model, scene);
     find_known(x, held);
     add_loads(x->known, x->model, scene, loads);
+    add_springs(x->known, x->model, scene, nodal);
     return UZ_OK;
 }
 
@@ -279,7 +321,7 @@ uz_status uz_thin_elements_errors(double **least, const uz_scene *scene, const u
     x.off = uz_alloc_zero(n * UZ_ELEMENT_STRESSES, sizeof *x.off);
     x.volume = uz_alloc(n, sizeof *x.volume);
     uz_status status = held && x.known && x.stress && x.off && x.volume
-                           ? begin(&x, held, scene, loads, err)
+                           ? begin(&x, held, scene, from->nodal, loads, err)
                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for sides of %lld elements", (long long)n);
     if (status == UZ_OK)
         status = uz_strain_groups(&work, from, NULL, err);
