@@ -21,6 +21,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Sizes that are the same but for rounding. */
+#define ALIKE 1e-6
+
 /* Sides of a zone that are looked at before the slave is chosen. */
 enum { LOOKED_AT = 500 };
 
@@ -264,26 +267,14 @@ bool uz_mortar_find_points(uz_mortar_pair *pair, int64_t i)
 
 /* ---- zones */
 
-typedef struct {
-    int64_t first, side, *id; /* the lowest place and side of a zone, and where its number stands */
-} zone_mark;
-
-static int by_place(const void *a, const void *b)
-{
-    const zone_mark *x = a, *y = b;
-    return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
-                                : (x->side > y->side) - (x->side < y->side);
-}
-
-/* zone (sides): zones numbered by their lowest nodes. Returns how many; -1: no memory. */
+/* zone (sides): which of the zones each is of. Returns how many; -1: no memory. */
 static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
 {
     const uz_mortar_surface *surface = &pair->surface;
     const int64_t places = surface->n_places;
     int64_t *of = uz_alloc(places, sizeof *of), *id = uz_alloc(3 * places, sizeof *id), count = 0;
     unsigned char *used = uz_alloc_zero(places, 1);
-    zone_mark *mark = uz_alloc(surface->n, sizeof *mark);
-    const bool room = of && id && used && mark;
+    const bool room = of && id && used;
     for (int64_t k = 0; k < 3 * places && room; k++)
         id[k] = -1;
     for (int group = 1; group <= 3 && room; group++) {
@@ -306,26 +297,104 @@ static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
             if (pair->of[i] != group)
                 continue;
             const int64_t root = uz_join_root(of, surface->side[i].place[0]);
-            if (own[root] < 0) {
-                own[root] = count;
-                mark[count++] = (zone_mark){root, i, NULL};
-            }
+            own[root] = own[root] < 0 ? count++ : own[root];
             zone[i] = own[root];
         }
     }
-    for (int64_t z = 0; z < count && room; z++)
-        mark[z].id = id + z; /* from here on room for the final numbers: there are no more zones than places */
-    if (room)
-        qsort(mark, (size_t)count, sizeof *mark, by_place);
-    for (int64_t z = 0; z < count && room; z++)
-        *mark[z].id = z;
-    for (int64_t i = 0; i < surface->n && room; i++)
-        zone[i] = id[zone[i]];
     free(of);
     free(id);
     free(used);
-    free(mark);
     return room ? count : -1;
+}
+
+/* ---- zones in their order */
+
+typedef struct {
+    double area, stiffness, away,
+        middle[3];               /* the mean over its sides; away: of their middle, from that of all nodes */
+    int64_t first, side, number; /* the lowest place and side of a zone, and its number */
+} zone_mark;
+
+/* -1, 1; 0: the same but for rounding. */
+static int compare_sizes(double x, double y)
+{
+    return fabs(x - y) <= ALIKE * fmax(fabs(x), fabs(y)) ? 0 : x < y ? -1 : 1;
+}
+
+/* The smaller one first, which ends on the other, then the softer, then the nearer to the middle of the mesh: what does
+ * not depend on how nodes are numbered, nor on which of them is `on`, nor on the axes. Then the lowest nodes. */
+static int by_order(const void *a, const void *b)
+{
+    const zone_mark *x = a, *y = b;
+    const int area = compare_sizes(x->area, y->area), stiffness = compare_sizes(x->stiffness, y->stiffness),
+              away = compare_sizes(x->away, y->away);
+    if (area || stiffness || away)
+        return area ? area : stiffness ? stiffness : away;
+    return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
+                                : (x->side > y->side) - (x->side < y->side);
+}
+
+/* The mean of all nodes. */
+static void middle_of(double middle[3], const uz_mesh *mesh)
+{
+    memset(middle, 0, 3 * sizeof *middle);
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
+        middle[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
+}
+
+/* Where a surface touches itself what a zone is depends on how much of the body the surface has, and its zones are of
+ * one body: they have no sizes. */
+static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, const uz_mortar_pair *pair)
+{
+    const uz_body_model *model = pair->in->model;
+    const int dim = model->mesh.dim;
+    double middle[3];
+    bool itself = false;
+    middle_of(middle, &model->mesh);
+    for (int64_t i = 0; i < pair->surface.n; i++)
+        itself = itself || pair->of[i] == (UZ_OF_ON | UZ_OF_WITH);
+    for (int64_t z = 0; z < count; z++)
+        mark[z] = (zone_mark){.first = INT64_MAX, .side = INT64_MAX, .number = z};
+    for (int64_t i = 0; i < pair->surface.n; i++) {
+        const uz_mortar_side *side = &pair->surface.side[i];
+        zone_mark *of = mark + zone[i];
+        of->area += side->area;
+        of->stiffness += side->area * uz_most_stiffness(uz_element_material(model, side->face.element)->lame);
+        for (int k = 0; k < side->nodes * dim; k++)
+            of->middle[k % dim] += side->area * side->xyz[k] / side->nodes;
+        for (int a = 0; a < side->nodes; a++)
+            of->first = side->place[a] < of->first ? side->place[a] : of->first;
+        of->side = i < of->side ? i : of->side;
+    }
+    for (int64_t z = 0; z < count; z++) {
+        if (itself) {
+            mark[z].area = mark[z].stiffness = 0;
+            continue;
+        }
+        mark[z].stiffness /= mark[z].area;
+        for (int c = 0; c < dim; c++)
+            mark[z].middle[c] /= mark[z].area;
+        mark[z].away = sqrt(uz_distance2(mark[z].middle, middle, dim));
+    }
+}
+
+/* Zones are numbered by their order. False: no memory. */
+static bool order_zones(int64_t *zone, int64_t count, const uz_mortar_pair *pair)
+{
+    zone_mark *mark = uz_alloc(count, sizeof *mark);
+    int64_t *number = uz_alloc(count, sizeof *number);
+    const bool room = mark && number;
+    if (room) {
+        measure_zones(mark, count, zone, pair);
+        qsort(mark, (size_t)count, sizeof *mark, by_order);
+    }
+    for (int64_t z = 0; z < count && room; z++)
+        number[mark[z].number] = z;
+    for (int64_t i = 0; i < pair->surface.n && room; i++)
+        zone[i] = number[zone[i]];
+    free(mark);
+    free(number);
+    return room;
 }
 
 /* ---- which zone is the slave */
@@ -403,12 +472,11 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
     return good ? n : -1;
 }
 
-/* Twice the distance of the farthest node from the mean of all, which is the same however the body is turned. */
+/* Twice the distance of the farthest node from the middle, which is the same however the body is turned. */
 static double size_of(const uz_mesh *mesh)
 {
-    double mean[3] = {0}, most = 0;
-    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
-        mean[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
+    double mean[3], most = 0;
+    middle_of(mean, mesh);
     for (int64_t i = 0; i < mesh->n_nodes; i++)
         most = fmax(most, uz_distance2(mesh->xyz + i * mesh->dim, mean, mesh->dim));
     return 2 * sqrt(most);
@@ -436,7 +504,7 @@ static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_
         for (int64_t k = first; k < end; k++)
             for (int j = 0; j < 2 && s[k].from_hi == from_hi && s[k].gap <= most; j++)
                 fine[j] += s[k].fine[j];
-        const bool hi = fine[1] > (1 + 1e-6) * fine[0];
+        const bool hi = fine[1] > (1 + ALIKE) * fine[0];
         sites->rank[2 * sites->n_ranks] = hi ? s[first].hi : s[first].lo;
         sites->rank[2 * sites->n_ranks++ + 1] = hi ? s[first].lo : s[first].hi;
     }
@@ -586,7 +654,8 @@ uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair,
     if (!before) {
         pair->rough = true;
         int64_t n_zones = number_zones(sites->zone, pair);
-        const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) && rank_zones(sites, pair, n_zones);
+        const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) &&
+                          order_zones(sites->zone, n_zones, pair) && rank_zones(sites, pair, n_zones);
         sites->n_zones = n_zones;
         pair->rough = false;
         return good ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
