@@ -61,7 +61,7 @@ enum { FEW_LINEAR = 64, FEW_QUADRATIC = 16 };
 /* What grids released is held against an estimate that fell to this part of its square by then; of two grids that are
  * hardly different it is noise. An estimate that hides more than it does beside corners (docs/theory.md) is one of
  * another answer, as where the coarser grid had not seen a contact. */
-#define FALLEN      0.5
+#define FALLEN      0.75
 #define MOST_HIDDEN 2.25
 /* Of large deformation: a finer grid whose estimated square is so many times that of the best one has gone to another
  * equilibrium, or to one without a limit. */
