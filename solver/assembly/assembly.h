@@ -190,6 +190,10 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
 /* f (m): what each row's node gets of the reactions r (m): r itself but around eight-node faces. */
 void uz_row_forces(double *f, const uz_body_model *model, const double *r);
 
+/* f (n_nodes x dim) += the derivative of the sum of force (m, uz_row_forces) times the gap of each row's node, by the
+ * displacements of all nodes whose shares it has. */
+void uz_push_nodes(double *f, const uz_body_model *model, const double *force);
+
 /* gap (m) of each row's node becomes that of the row: itself but around eight-node faces. */
 void uz_blend_rows(double *gap, const uz_body_model *model);
 
@@ -237,10 +241,13 @@ void uz_body_turned_clear(uz_body_model *turned);
 /* given (n_fixed): in the places of groups' motions the step from u to what is prescribed; others stay. Groups in space
  * have all rotations held, or none, or two that are prescribed as none. */
 void uz_rigid_ways(double *given, const uz_body_model *model, const double *prescribed, const double *u);
-/* u, at a linear step from `from`, becomes one that moves groups as rigid bodies. */
+/* u, at a linear step from `from`, becomes one that moves groups as rigid bodies, and what follows them with these. */
 void uz_rigid_step(double *u, const uz_body_model *model, const double *from);
-/* K and K_fixed of `to` get what the forces f (n_nodes x dim) make of rotations from u. */
-void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, const double *f);
+/* Of the displacement u of node a what it has from rigid groups, whose dofs tell a step alone. */
+void uz_rigid_part(double at[3], const uz_body_model *model, int64_t a, const double *u);
+/* K and K_fixed of `to` get what the forces f (n_nodes x dim) make of rotations from u. Those of nodes that follow
+ * others go to these. */
+void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, double *f);
 /* Are these the nodes of one rigid group, so that no element of them is strained? */
 bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count);
 /* Adds a block (dim x dim) of the dofs of two nodes to K and K_fixed, whose patterns have it. */

@@ -163,7 +163,7 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
     if (status == UZ_OK)
         status = uz_choose_frames(model, scene, err);
     if (status == UZ_OK)
-        status = uz_find_followers(model, err);
+        status = uz_find_followers(model, NULL, err);
     if (status == UZ_OK && scene->place) {
         const uz_body_model rest = *model;
         status = displace(model, &rest, scene, err);

@@ -322,6 +322,24 @@ void uz_row_forces(double *f, const uz_body_model *model, const double *r)
             f[model->row_ends[2 * i + k]] -= UZ_MIDDLE_SHARE * (r[i] / (1 - 2 * UZ_MIDDLE_SHARE));
 }
 
+void uz_push_nodes(double *f, const uz_body_model *model, const double *force)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t i = 0; i < model->m; i++) {
+        const uz_inner_place *inner = uz_row_inner(model, i);
+        const uz_contact_sites *sites = &model->sites[model->info.contact_of[i]];
+        const double *normal = model->info.contact_normal + dim * i;
+        const int64_t place = model->row_place[i],
+                      masters = model->info.contact_face[2 * i] < 0 ? 0 : sites->first[place];
+        for (int p = 0; p < dim * (inner ? inner->nodes : 1); p++)
+            f[dim * (inner ? inner->node[p / dim] : model->info.contact_node[i]) + p % dim] +=
+                (inner ? inner->share[p / dim] : 1) * force[i] * normal[p % dim];
+        for (int64_t q = masters; model->info.contact_face[2 * i] >= 0 && q < sites->first[place + 1]; q++)
+            for (int c = 0; c < dim; c++)
+                f[dim * sites->node[q] + c] -= sites->weight[q] * force[i] * normal[c];
+    }
+}
+
 void uz_blend_rows(double *gap, const uz_body_model *model)
 {
     const int64_t *ends = model->row_ends;
@@ -399,9 +417,11 @@ static void prescribed_at(double u[3], const uz_body_model *model, const uz_cont
             u[c] += share[k - 1] * at[c];
     }
     /* What a group is given is a step from the place, what others are is from rest. */
-    const int given_from = model->turned && uz_is_rigid(model, node), wanted_from = row->place != NULL;
-    for (int c = 0; c < dim && given_from != wanted_from; c++)
-        u[c] += (given_from - wanted_from) * model->place[node * dim + c];
+    double rigid[3] = {0};
+    if (model->turned)
+        uz_rigid_part(rigid, model, node, model->place);
+    for (int c = 0; c < dim && (model->turned || row->place); c++)
+        u[c] += rigid[c] - (row->place ? model->place[node * dim + c] : 0);
 }
 
 /* The gap of a row with the prescribed displacements and zero for the free ones. The sum is also given in absolute

@@ -4,6 +4,7 @@
 
 #include "assembly/assembly.h"
 #include "brick/brick.h"
+#include "linalg/linalg.h"
 
 /* Unit vectors that differ less from the span of others add nothing to it. */
 #define UZ_DEPENDENT 1e-9
@@ -24,8 +25,8 @@ void uz_rigid_values(double *value, const uz_body_model *model, const uz_scene *
 uz_status uz_find_tied(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* tied, dof as the supports have it, rigid_of -> UZ_NO_DOF for what follows masters. */
 uz_status uz_number_tied(uz_body_model *model, uz_error *err);
-/* rigid, tied, frames -> follow. */
-uz_status uz_find_followers(uz_body_model *model, uz_error *err);
+/* rigid, tied, frames -> follow. u (n_nodes x dim): of a step from there; NULL: from rest. */
+uz_status uz_find_followers(uz_body_model *model, const double *u, uz_error *err);
 void uz_followers_clear(uz_followers *follow);
 /* share (dim x dim): what a rotation times the group's size does at the end of an arm in parts of it. */
 void uz_rigid_arms(double *share, const double arm[3], int dim);
@@ -33,6 +34,10 @@ void uz_rigid_arms(double *share, const double arm[3], int dim);
 bool uz_have_carriers(const uz_body_model *model, const int64_t *node, int count);
 /* uz_add_stiffness for nodes of which one does. */
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count);
+/* The derivative B (dim x dim, by rows) of a force on node i by displacements of node j, as one by dofs of forces on
+ * dofs; that of a number by displacements of node j, as one by dofs in a row. false: no memory. */
+bool uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9]);
+bool uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3]);
 /* u along the axes of a node that follows others, from the free dofs and the prescribed values (NULL: zero). */
 void uz_carried(double u[3], const uz_body_model *model, int64_t a, const double *free, const double *prescribed);
 /* The free dofs u (d) of a group get a motion: t at its point, w in radians. */

@@ -186,19 +186,25 @@ void uz_rigid_arms(double *share, const double arm[3], int dim)
     }
 }
 
-/* share: u of a node of the group from the dofs of its anchors, dim x dim each. Returns how many anchors. */
-static int rigid_shares(double share[2][9], const uz_body_model *model, const uz_rigid_group *group, int64_t node)
+/* share: u of a node of the group from the dofs of its anchors, dim x dim each. Returns how many anchors. u: as of
+ * uz_find_followers. */
+static int rigid_shares(double share[2][9], const uz_body_model *model, const uz_rigid_group *group, int64_t node,
+                        const double *u)
 {
     const int dim = model->mesh.dim;
-    double x[3], r[3];
+    double x[3], r[3], t[3] = {0}, R[9];
     memset(share[0], 0, 2 * sizeof share[0]);
     if (model->kind == UZ_AXISYMMETRIC) {
         share[0][3] = 1;
         return 1;
     }
     place_of(x, &model->mesh, node);
+    if (u)
+        uz_rigid_place(t, R, model, group, u);
+    for (int c = 0; c < dim && u; c++)
+        x[c] += u[node * dim + c];
     for (int c = 0; c < 3; c++)
-        r[c] = (x[c] - group->point[c]) / group->size;
+        r[c] = (x[c] - group->point[c] - t[c]) / group->size;
     for (int c = 0; c < dim; c++)
         share[0][c * dim + c] = 1;
     uz_rigid_arms(share[1], r, dim);
@@ -206,7 +212,7 @@ static int rigid_shares(double share[2][9], const uz_body_model *model, const uz
 }
 
 /* Carriers of a node that is no hanging one, as they are appended. */
-static int own_carriers(int64_t node[2], double share[2][9], const uz_body_model *model, int64_t a)
+static int own_carriers(int64_t node[2], double share[2][9], const uz_body_model *model, int64_t a, const double *u)
 {
     const int dim = model->mesh.dim;
     const uz_rigid_group *group = uz_rigid_group_of(model, a);
@@ -214,7 +220,7 @@ static int own_carriers(int64_t node[2], double share[2][9], const uz_body_model
     if (group) {
         node[0] = group->anchor[0];
         node[1] = group->anchor[1];
-        return rigid_shares(share, model, group, a);
+        return rigid_shares(share, model, group, a, u);
     }
     node[0] = a;
     for (int i = 0; i < dim; i++) /* Q', from its dofs to the axes */
@@ -238,7 +244,7 @@ static void append(uz_followers *f, int64_t start, int64_t *n, int dim, int64_t 
 }
 
 /* A slave of a tie: the carriers of its masters, and itself for what supports hold of it. */
-static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model, int64_t a)
+static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model, int64_t a, const double *u)
 {
     const uz_csc *tied = &model->tied.share;
     const int dim = model->mesh.dim;
@@ -246,7 +252,7 @@ static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model,
     int64_t node[2];
     bool any = false;
     for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++) {
-        const int carriers = own_carriers(node, own, model, tied->idx[q]);
+        const int carriers = own_carriers(node, own, model, tied->idx[q], u);
         for (int k = 0; k < carriers; k++) {
             for (int j = 0; j < dim; j++) {
                 double column[3] = {0};
@@ -272,7 +278,7 @@ static void append_tied(uz_followers *f, int64_t *n, const uz_body_model *model,
 }
 
 /* Nodes of rigid groups and tied ones, and hanging ones, which may lie amid such. */
-uz_status uz_find_followers(uz_body_model *model, uz_error *err)
+uz_status uz_find_followers(uz_body_model *model, const double *u, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
@@ -299,9 +305,9 @@ uz_status uz_find_followers(uz_body_model *model, uz_error *err)
         const int parents = hangs ? uz_mesh_amid(&from, &amid, mesh, a) : uz_is_rigid(model, a);
         f->first[a] = n;
         if (uz_is_tied(model, a))
-            append_tied(f, &n, model, a);
+            append_tied(f, &n, model, a, u);
         for (int p = 0; p < parents; p++) {
-            const int carriers = own_carriers(node, own, model, from[p]);
+            const int carriers = own_carriers(node, own, model, from[p], u);
             for (int k = 0; k < carriers; k++)
                 append(f, f->first[a], &n, dim, node[k], own[k], amid[p]);
         }
@@ -329,7 +335,7 @@ static int64_t carriers_or_self(const int64_t **node, const double **share, doub
     double own[2][9];
     if (count > 0)
         return count;
-    own_carriers(self, own, model, *a);
+    own_carriers(self, own, model, *a, NULL);
     memcpy(turned, own[0], sizeof own[0]);
     *node = a;
     *share = turned;
@@ -372,6 +378,45 @@ bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count
     for (int a = 0; a < count && unstrained; a++)
         unstrained = uz_is_rigid(model, node[a]) && model->rigid_of[node[a]] == model->rigid_of[node[0]];
     return unstrained;
+}
+
+bool uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9])
+{
+    const int dim = model->mesh.dim;
+    const int64_t *p, *q;
+    const double *P, *Q;
+    double turned[2][9], block[9];
+    const int64_t ps = carriers_or_self(&p, &P, turned[0], model, &i),
+                  qs = carriers_or_self(&q, &Q, turned[1], model, &j);
+    bool room = true;
+    for (int64_t k = 0; k < ps * qs && room; k++) {
+        carry_block(block, B, dim, P + k / qs * dim * dim, Q + k % qs * dim * dim, dim);
+        for (int c = 0; c < dim * dim && room; c++) {
+            const int64_t row = model->dof[p[k / qs] * dim + c / dim], column = model->dof[q[k % qs] * dim + c % dim];
+            if (row >= 0 && column >= 0 && block[c] != 0)
+                room = uz_entries_add(to, row, column, block[c]);
+        }
+    }
+    return room;
+}
+
+bool uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3])
+{
+    const int dim = model->mesh.dim;
+    const int64_t *node;
+    const double *share;
+    double turned[9];
+    const int64_t count = carriers_or_self(&node, &share, turned, model, &j);
+    bool room = true;
+    for (int64_t i = 0; i < count * dim && room; i++) {
+        const int64_t dof = model->dof[node[i / dim] * dim + i % dim];
+        double along = 0;
+        for (int c = 0; c < dim; c++)
+            along += share[(i / dim * dim + c) * dim + i % dim] * slope[c];
+        if (dof >= 0 && along != 0)
+            room = uz_entries_add(to, row, dof, along);
+    }
+    return room;
 }
 
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count)

@@ -132,37 +132,23 @@ static void displacement(double *u, const uz_body_model *model, const uz_rigid_g
 
 uz_status uz_body_turned(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err)
 {
-    const int dim = model->mesh.dim;
-    const uz_followers *follow = &model->follow;
     *out = *model;
     if (model->n_rigid == 0)
         return UZ_OK;
-    const int64_t n = follow->first[model->mesh.n_nodes] * dim * dim;
-    out->follow.share = uz_alloc(n, sizeof *out->follow.share);
-    if (!out->follow.share) {
-        out->follow.share = follow->share;
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the nodes of rigid groups");
+    memset(&out->follow, 0, sizeof out->follow);
+    const uz_status status = uz_find_followers(out, u, err);
+    out->turned = status == UZ_OK;
+    if (status != UZ_OK) {
+        uz_followers_clear(&out->follow);
+        out->follow = model->follow;
     }
-    memcpy(out->follow.share, follow->share, (size_t)n * sizeof *out->follow.share);
-    out->turned = true;
-    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind != UZ_AXISYMMETRIC; a++) {
-        const uz_rigid_group *group = uz_rigid_group_of(model, a);
-        double t[3], R[9], at[3], arm[3];
-        if (!group)
-            continue;
-        uz_rigid_place(t, R, model, group, u);
-        place_of(at, model, a, u);
-        for (int c = 0; c < 3; c++)
-            arm[c] = (at[c] - group->point[c] - t[c]) / group->size;
-        uz_rigid_arms(out->follow.share + (follow->first[a] + 1) * dim * dim, arm, dim);
-    }
-    return UZ_OK;
+    return status;
 }
 
 void uz_body_turned_clear(uz_body_model *turned)
 {
     if (turned->turned)
-        free(turned->follow.share);
+        uz_followers_clear(&turned->follow);
     memset(turned, 0, sizeof *turned);
 }
 
@@ -202,6 +188,59 @@ void uz_rigid_ways(double *given, const uz_body_model *model, const double *pres
     }
 }
 
+void uz_rigid_part(double at[3], const uz_body_model *model, int64_t a, const double *u)
+{
+    const int dim = model->mesh.dim;
+    const uz_csc *tied = &model->tied.share;
+    memset(at, 0, 3 * sizeof *at);
+    if (model->n_rigid == 0)
+        return;
+    if (uz_is_tied(model, a)) {
+        for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++)
+            for (int c = 0; c < dim && uz_is_rigid(model, tied->idx[q]); c++)
+                at[c] += tied->val[q] * u[(int64_t)tied->idx[q] * dim + c];
+        uz_tied_part(at, model, a);
+        return;
+    }
+    const int64_t *from = &a;
+    const double whole = 1, *share = &whole;
+    const int count = uz_mesh_hangs(&model->mesh, a) ? uz_mesh_amid(&from, &share, &model->mesh, a) : 1;
+    for (int k = 0; k < count; k++)
+        for (int c = 0; c < dim && uz_is_rigid(model, from[k]); c++)
+            at[c] += share[k] * u[from[k] * dim + c];
+}
+
+/* u of a tied node: where its masters are, but for what supports hold of it. */
+static void follow_masters(double *u, const uz_body_model *model, int64_t a)
+{
+    const int dim = model->mesh.dim;
+    double way[3] = {0};
+    for (int c = 0; c < dim; c++)
+        way[c] = uz_tied_value(model, a, u + c, dim);
+    if (uz_node_frame(model, a)) {
+        for (int c = 0; c < dim; c++)
+            way[c] -= u[a * dim + c];
+        uz_tied_part(way, model, a);
+        for (int c = 0; c < dim; c++)
+            way[c] += u[a * dim + c];
+    }
+    for (int c = 0; c < dim; c++)
+        if (uz_node_frame(model, a) || model->dof[a * dim + c] == UZ_NO_DOF)
+            u[a * dim + c] = way[c];
+}
+
+/* What hangs amid others, or is tied to them, where it may follow rigid groups. */
+static void follow_others(double *u, const uz_body_model *model)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->n_rigid > 0; a++) {
+        for (int c = 0; c < dim && uz_mesh_hangs(&model->mesh, a); c++)
+            u[a * dim + c] = uz_mesh_value_amid(&model->mesh, a, u + c, dim);
+        if (uz_is_tied(model, a))
+            follow_masters(u, model, a);
+    }
+}
+
 void uz_rigid_step(double *u, const uz_body_model *model, const double *from)
 {
     const int dim = model->mesh.dim;
@@ -220,11 +259,38 @@ void uz_rigid_step(double *u, const uz_body_model *model, const double *from)
             else if (uz_rigid_group_of(model, a) == group)
                 u[a * dim + 1] = from[a * dim + 1] + dt[1];
     }
+    follow_others(u, model);
 }
 
-void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, const double *f)
+/* Forces on what follows others go to these. f: n_nodes x dim. */
+static void leave_followers(double *f, const uz_body_model *model)
 {
     const int dim = model->mesh.dim;
+    const uz_csc *tied = &model->tied.share;
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        const int64_t *from;
+        const double *share;
+        const int count = uz_mesh_hangs(&model->mesh, a) ? uz_mesh_amid(&from, &share, &model->mesh, a) : 0;
+        double left[3] = {0};
+        memcpy(left, f + a * dim, (size_t)dim * sizeof *left);
+        if (uz_is_tied(model, a))
+            uz_tied_part(left, model, a);
+        else if (count == 0)
+            continue;
+        for (int c = 0; c < dim; c++) {
+            for (int k = 0; k < count; k++)
+                f[from[k] * dim + c] += share[k] * left[c];
+            for (int64_t q = uz_is_tied(model, a) ? tied->ptr[a] : 0; uz_is_tied(model, a) && q < tied->ptr[a + 1]; q++)
+                f[(int64_t)tied->idx[q] * dim + c] += tied->val[q] * left[c];
+            f[a * dim + c] -= left[c];
+        }
+    }
+}
+
+void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, double *f)
+{
+    const int dim = model->mesh.dim;
+    leave_followers(f, model);
     for (int64_t k = 0; k < model->n_rigid && model->kind != UZ_AXISYMMETRIC; k++) {
         const uz_rigid_group *group = &model->rigid[k];
         double t[3], R[9], G[9] = {0}, block[9] = {0};

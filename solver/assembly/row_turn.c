@@ -201,26 +201,42 @@ static void match_rows(moved_rows *out, const work *w, const uz_body_model *move
     }
 }
 
-/* What two places on either side say of the pressed rows: each depends on one of the moved nodes at most. */
+/* A node of its own dofs is moved along these, one that others carry along the axes. */
+static bool is_moved(const uz_body_model *model, int64_t node, int c)
+{
+    const double along[3] = {c == 0, c == 1, c == 2};
+    return uz_have_carriers(model, &node, 1) ? uz_is_contact_row(model, node, along)
+                                             : model->dof[model->mesh.dim * node + c] >= 0;
+}
+
+static bool add_slope(uz_entries *to, int64_t row, const uz_body_model *model, int64_t node, int c, double value)
+{
+    const double slope[3] = {c == 0 ? value : 0, c == 1 ? value : 0, c == 2 ? value : 0};
+    return uz_have_carriers(model, &node, 1) ? uz_add_carried_row(to, row, model, node, slope)
+                                             : uz_entries_add(to, row, model->dof[model->mesh.dim * node + c], value);
+}
+
+/* What two places on either side say of the pressed rows: each depends on one of the moved nodes at most. Where nodes
+ * have common dofs the part of N is added once for all of them, by add_pressed_rows. */
 static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2], int64_t color, int c)
 {
     const uz_body_model *base = w->base;
-    const int dim = base->mesh.dim;
     for (int64_t j = 0; j < w->n_pressed; j++) {
-        int64_t dof = -1;
-        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1] && dof < 0; q++)
-            if (w->color[w->near[q]] == color)
-                dof = base->dof[dim * w->near[q] + c];
-        if (dof < 0)
+        int64_t node = -1;
+        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1] && node < 0; q++)
+            node = w->color[w->near[q]] == color ? w->near[q] : -1;
+        if (node < 0 || !is_moved(base, node, c))
             continue;
         if (side[0].at[j] < 0 || side[1].at[j] < 0) {
             out->known = false;
             return true;
         }
-        const int64_t row = w->pressed[j], own = uz_csc_find(&w->rows->N, row, dof);
+        const int64_t row = w->pressed[j],
+                      own =
+                          base->follow.first ? -1 : uz_csc_find(&w->rows->N, row, base->dof[base->mesh.dim * node + c]);
         const double change = (side[1].gap[j] - side[0].gap[j]) / (2 * w->by),
                      along = own < 0 ? 0 : w->rows->N.val[own];
-        if (fabs(change + along) > ROUNDING && !uz_entries_add(&out->gap, row, dof, change + along))
+        if (fabs(change + along) > ROUNDING && !add_slope(&out->gap, row, base, node, c, change + along))
             return false;
         for (int s = 0; s < 2; s++)
             for (int64_t q = side[s].rows.ptr[side[s].at[j]]; q < side[s].rows.ptr[side[s].at[j] + 1]; q++)
@@ -231,14 +247,23 @@ static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
                 const double slope = w->sum[i] / (2 * w->by);
                 w->sum[i] = 0;
                 if (fabs(slope) * w->by > ROUNDING * MOVED_BY &&
-                    !uz_entries_add(&out->force, i, dof, w->r[row] * slope))
+                    !add_slope(&out->force, i, base, node, c, w->r[row] * slope))
                     return false;
             }
     }
     return true;
 }
 
-/* All nodes of a color along their dof c, there and back. */
+/* u: `by` along c at the nodes of a color that others carry, whose way tells nothing of them. */
+static void move_carried(work *w, int64_t color, int c, double by)
+{
+    const int dim = w->base->mesh.dim;
+    for (int64_t a = 0; a < w->base->mesh.n_nodes && w->base->follow.first; a++)
+        for (int k = 0; k < dim && uz_have_carriers(w->base, &a, 1); k++)
+            w->u[dim * a + k] = k == c && w->color[a] == color && is_moved(w->base, a, c) ? by : 0;
+}
+
+/* All nodes of a color along c, there and back. */
 static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64_t color, int c, uz_error *err)
 {
     const uz_body_model *base = w->base;
@@ -248,8 +273,9 @@ static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64
     bool any = false;
     memset(w->way, 0, (size_t)base->d * sizeof *w->way);
     for (int64_t a = 0; a < base->mesh.n_nodes; a++)
-        if (w->color[a] == color && base->dof[dim * a + c] >= 0) {
-            w->way[base->dof[dim * a + c]] = w->by;
+        if (w->color[a] == color && is_moved(base, a, c)) {
+            if (!uz_have_carriers(base, &a, 1))
+                w->way[base->dof[dim * a + c]] = w->by;
             any = true;
         }
     for (int s = 0; s < 2 && status == UZ_OK && any && out->known; s++) {
@@ -258,6 +284,7 @@ static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64
         for (int64_t j = 0; j < base->d; j++)
             w->way[j] = s ? fabs(w->way[j]) : -w->way[j];
         uz_recover_nodal(w->u, base, w->way, NULL);
+        move_carried(w, color, c, s ? w->by : -w->by);
         for (int64_t i = 0; i < dim * base->mesh.n_nodes; i++)
             w->u[i] += w->rows->place[i];
         scene.place = w->u;
@@ -281,6 +308,29 @@ static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64
     return status;
 }
 
+static bool add_pressed_rows(uz_entries *to, const work *w)
+{
+    const uz_csc *N = &w->rows->N;
+    bool room = true;
+    for (int64_t j = 0; j < N->cols; j++)
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1] && room; q++) {
+            const int64_t i = N->idx[q];
+            const bool pressed =
+                w->r[i] < -w->least && w->scene->contacts[w->rows->info.contact_of[i]].kind == UZ_OBSTACLE_BODY;
+            room = !pressed || uz_entries_add(to, i, j, N->val[q]);
+        }
+    return room;
+}
+
+/* The body at rest, whose nodes follow others as they do in `rows`. */
+static uz_body_model with_followers(const uz_body_model *base, const uz_body_model *rows)
+{
+    uz_body_model out = *base;
+    out.follow = rows->follow;
+    out.turned = rows->turned;
+    return out;
+}
+
 static bool list_pressed(work *w)
 {
     const uz_body_model *rows = w->rows;
@@ -295,7 +345,8 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
                            const uz_scene *scene, const double *r, double least, const uz_stop *stop, uz_error *err)
 {
     const int dim = base->mesh.dim;
-    work w = {.base = base, .rows = rows, .scene = scene, .r = r, .least = least};
+    const uz_body_model there = with_followers(base, rows);
+    work w = {.base = &there, .rows = rows, .scene = scene, .r = r, .least = least};
     moved_rows side[2] = {{.at = NULL}, {.at = NULL}};
     uz_status status = UZ_OK;
     *out = (uz_row_turn){.known = true};
@@ -322,6 +373,8 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
             if (out->known)
                 status = move_color(out, &w, side, color, c, err);
         }
+    if (status == UZ_OK && base->follow.first && !add_pressed_rows(&out->gap, &w))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
     if (!out->known)
         out->force.n = out->gap.n = 0;
     free(w.beside_first);
@@ -404,7 +457,8 @@ uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_bo
                             uz_error *err)
 {
     const int64_t n = base->mesh.dim * base->mesh.n_nodes, d = base->d;
-    work w = {.base = base, .rows = rows, .scene = scene, .r = r};
+    const uz_body_model there = with_followers(base, rows);
+    work w = {.base = &there, .rows = rows, .scene = scene, .r = r};
     double most = 0, *change = uz_alloc_zero(d + rows->m, sizeof *change);
     uz_status status = UZ_OK;
     *known = false;
@@ -415,7 +469,7 @@ uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_bo
         most = fmax(most, fabs(v[j]));
     const double part = MOVED_ALONG * base->mesh.extent / most;
     if (status == UZ_OK && most > 0 && isfinite(part)) {
-        uz_recover_nodal(w.u, base, v, NULL);
+        uz_recover_nodal(w.u, &there, v, NULL);
         for (int64_t i = 0; i < n; i++)
             w.u[i] = rows->place[i] + part * w.u[i];
         status = difference_along(known, change, &w, part, err);

@@ -34,36 +34,6 @@ typedef struct {
     double *sum;            /* n x 3: of the faces' normals */
 } work;
 
-/* B (3 x 3) of a displacement of node j in a force on node i. */
-static bool add_block(work *w, int64_t i, int64_t j, const double B[3][3])
-{
-    const int64_t *dof = w->rows->dof;
-    double part[3][3]; /* B along the axes of j's dofs, then of i's */
-    bool room = true;
-    for (int c = 0; c < 3; c++)
-        uz_to_frame(part[c], w->rows, j, B[c]);
-    for (int k = 0; k < 3 && room; k++) {
-        const double column[3] = {part[0][k], part[1][k], part[2][k]};
-        double force[3];
-        uz_to_frame(force, w->rows, i, column);
-        for (int c = 0; c < 3 && room; c++)
-            if (dof[3 * i + c] >= 0 && dof[3 * j + k] >= 0 && force[c] != 0)
-                room = uz_entries_add(&w->out->force, dof[3 * i + c], dof[3 * j + k], force[c]);
-    }
-    return room;
-}
-
-static bool add_gap(work *w, int64_t row, int64_t j, const double slope[3])
-{
-    double along[3];
-    bool room = true;
-    uz_to_frame(along, w->rows, j, slope);
-    for (int c = 0; c < 3 && room; c++)
-        if (w->rows->dof[3 * j + c] >= 0 && along[c] != 0)
-            room = uz_entries_add(&w->out->gap, row, w->rows->dof[3 * j + c], along[c]);
-    return room;
-}
-
 /* ---- what is multiplied */
 
 /* A middle's row is (row - s (first + second)) / (1 - 2 s) of rows of its own and its edge's ends, and its shares are
@@ -147,10 +117,11 @@ static bool turn_normal(work *w, const uz_mortar_side *side, int a)
         for (int64_t q = sites->first[p] - 1; q < sites->first[p + 1] && room; q++) { /* the slave, then masters */
             const bool slave = q < sites->first[p];
             const double factor = w->along[p] * (slave ? 1 : -sites->weight[q]);
-            double part[3][3];
+            double part[9];
             for (int k = 0; k < 9; k++)
-                part[k / 3][k % 3] = factor * B[k / 3][k % 3];
-            room = add_block(w, slave ? sites->at[p] : sites->node[q], side->node[b], part);
+                part[k] = factor * B[k / 3][k % 3];
+            room = uz_add_carried_block(&w->out->force, w->rows, slave ? sites->at[p] : sites->node[q], side->node[b],
+                                        part);
         }
     }
     return room;
@@ -246,14 +217,14 @@ static bool take_slopes(work *w, const slopes *of, const uz_mortar_side *side, c
     for (int b = 0; b < count && room; b++) {
         const int64_t j = b < side->nodes ? side->node[b] : other->node[b - side->nodes];
         for (int l = 0; l < other->nodes && room; l++) {
-            double B[3][3];
+            double B[9];
             for (int c = 0; c < 3; c++)
-                memcpy(B[c], of->force[l][c][b], sizeof B[c]);
-            room = add_block(w, other->node[l], j, B);
+                memcpy(B + 3 * c, of->force[l][c][b], 3 * sizeof *B);
+            room = uz_add_carried_block(&w->out->force, w->rows, other->node[l], j, B);
         }
         for (int a = 0; a < side->nodes && room; a++)
             if (w->row[side->place[a]] >= 0)
-                room = add_gap(w, w->row[side->place[a]], j, of->gap[a][b]);
+                room = uz_add_carried_row(&w->out->gap, w->row[side->place[a]], w->rows, j, of->gap[a][b]);
     }
     return room;
 }

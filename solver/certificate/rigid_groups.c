@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Where a group is: by its anchors, whose places are two or three of a triangle's. */
 typedef struct {
@@ -160,6 +161,45 @@ double uz_rigid_groups_off(const uz_finite_answer *of)
     return most;
 }
 
+/* What a row between bodies presses its masters with: `force` on its slave, their shares of it on them. */
+static void add_masters(double *nodal, const uz_body_model *model, int64_t row, double force)
+{
+    const int dim = model->mesh.dim;
+    const int64_t place = model->row_place[row];
+    const uz_contact_sites *sites = &model->sites[model->info.contact_of[row]];
+    if (model->info.contact_face[2 * row] < 0)
+        return;
+    for (int64_t q = sites->first[place]; q < sites->first[place + 1]; q++)
+        for (int c = 0; c < dim; c++)
+            nodal[dim * sites->node[q] + c] -= sites->weight[q] * force * model->info.contact_normal[dim * row + c];
+}
+
+/* Forces on nodes that hang amid others, or are tied to them, are forces on these. */
+static void let_go(double *nodal, const uz_body_model *model)
+{
+    const int dim = model->mesh.dim;
+    const uz_csc *tied = &model->tied.share;
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        double *own = nodal + dim * a, part[3] = {0};
+        memcpy(part, own, (size_t)dim * sizeof *part);
+        if (uz_is_tied(model, a))
+            uz_tied_part(part, model, a);
+        for (int c = 0; c < dim; c++) {
+            if (uz_mesh_hangs(&model->mesh, a)) {
+                const int64_t *node;
+                const double *share;
+                for (int k = uz_mesh_amid(&node, &share, &model->mesh, a); k-- > 0;)
+                    nodal[dim * node[k] + c] += share[k] * part[c];
+                own[c] = 0;
+            } else if (uz_is_tied(model, a)) {
+                for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++)
+                    nodal[(int64_t)dim * tied->idx[q] + c] += tied->val[q] * part[c];
+                own[c] -= part[c];
+            }
+        }
+    }
+}
+
 uz_status uz_rigid_groups_bend(uz_body_model *tangent, double *nodal, const uz_finite_answer *of, uz_error *err)
 {
     const uz_body_model *model = of->model;
@@ -170,15 +210,17 @@ uz_status uz_rigid_groups_bend(uz_body_model *tangent, double *nodal, const uz_f
     uz_row_forces(force, model, of->r);
     for (int64_t i = 0; i < dim * model->mesh.n_nodes; i++)
         nodal[i] = -nodal[i];
-    for (int64_t row = 0; row < model->m; row++) { /* of obstacles; no other body touches a rigid group */
+    for (int64_t row = 0; row < model->m; row++) {
         const uz_inner_place *inner = uz_row_inner(model, row);
         const double *normal = model->info.contact_normal + dim * row;
-        for (int p = 0; p < dim * (inner ? inner->nodes : 1) && model->info.contact_face[2 * row] < 0; p++) {
+        for (int p = 0; p < dim * (inner ? inner->nodes : 1); p++) {
             const int64_t node = inner ? inner->node[p / dim] : model->info.contact_node[row];
             nodal[dim * node + p % dim] += (inner ? inner->share[p / dim] : 1) * force[row] * normal[p % dim];
         }
+        add_masters(nodal, model, row, force[row]);
     }
     free(force);
+    let_go(nodal, model);
     for (int64_t k = 0; k < model->n_rigid && model->kind != UZ_AXISYMMETRIC; k++) {
         group_at at;
         find_group(&at, of, &model->rigid[k]);

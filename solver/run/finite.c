@@ -50,11 +50,6 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
                        "cells are chosen by the error of small deformation; give their numbers where kinematics are "
                        "finite");
     const bool refines = problem->scene.refine;
-    for (int64_t i = 0; i < problem->scene.n_supports && refines; i++)
-        if (problem->scene.supports[i].kind == UZ_SUPPORT_RIGID)
-            return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
-                           "nodes that hang beside a rigid group do not follow it where kinematics are finite: give a "
-                           "mesh, or hold the side by its displacements");
     if (refines && !uz_is_finite(problem)) /* before what it asks of the accuracy */
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
                        "a mesh is refined by the error of one model, and auto may take either: ask for the kinematics "
@@ -182,34 +177,12 @@ static uz_status check_tie(const uz_body_model *base, const uz_group *group, int
 static uz_status check_ties(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
     uz_status status = UZ_OK;
-    const int64_t *ptr = base->tied.share.ptr;
-    for (int64_t q = 0; q < (ptr ? ptr[base->mesh.n_nodes] : 0) && base->n_rigid > 0; q++)
-        if (uz_is_rigid(base, base->tied.share.idx[q]))
-            return uz_fail(err, UZ_ERR_SCENE, "/ties",
-                           "node %lld is of a rigid group, and others follow it by a tie, which finite kinematics have "
-                           "no model for: leave the sides there out of one",
-                           (long long)base->tied.share.idx[q]);
     for (int64_t k = 0; k < 2 * scene->n_ties && status == UZ_OK; k++) {
         const uz_tie *tie = &scene->ties[k / 2];
         const uz_group *group = uz_mesh_group(&base->mesh, k % 2 ? tie->to : tie->on, "/ties", err);
         status = group ? check_tie(base, group, k / 2, err) : UZ_ERR_SCENE;
     }
     return status;
-}
-
-/* Forces of rows between bodies go over from node to node, and are known to go to nodes with dofs of their own. */
-static uz_status check_followers(const uz_body_model *base, const uz_group *group, const char *where, uz_error *err)
-{
-    for (int64_t i = 0; i < uz_group_node_count(&base->mesh, group); i++) {
-        const int64_t node = uz_group_node_at(group, i);
-        if (uz_is_tied(base, node) || uz_is_rigid(base, node))
-            return uz_fail(err, UZ_ERR_SCENE, where,
-                           "node %lld of \"%.63s\" %s, and finite kinematics have no contact between bodies there: "
-                           "leave its sides out of one of them",
-                           (long long)node, group->name,
-                           uz_is_rigid(base, node) ? "is of a rigid group" : "follows a surface that it is tied to");
-    }
-    return UZ_OK;
 }
 
 /* What checks of the scene alone could not see. */
@@ -232,11 +205,6 @@ static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "finite kinematics have no contact of a surface with itself; name two surfaces without "
                            "common sides");
-        uz_status status = check_followers(base, with, where, err);
-        snprintf(where, sizeof where, "/contacts/%lld/on", (long long)k);
-        status = status == UZ_OK ? check_followers(base, on, where, err) : status;
-        if (status != UZ_OK)
-            return status;
     }
     return check_ties(base, scene, err);
 }
@@ -417,12 +385,24 @@ static bool start_at(settled *to, const uz_finite_point *from)
 /* run->at becomes the place that is near the answer, with supports where the whole load has them. */
 static uz_status begin_near(uz_finite_run *run, uz_error *err)
 {
-    const uz_status status = put_on(run, 1, err);
+    bool fits = true;
+    uz_status status = put_on(run, 1, err);
     if (status != UZ_OK)
         return status;
-    uz_restrict_nodal(run->v, &run->base, run->near);
-    uz_recover_nodal(run->at.u, &run->base, run->v, run->prescribed);
-    return UZ_OK;
+    if (run->base.n_rigid == 0) {
+        uz_restrict_nodal(run->v, &run->base, run->near);
+        uz_recover_nodal(run->at.u, &run->base, run->v, run->prescribed);
+        return UZ_OK;
+    }
+    memcpy(run->at.u, run->near, (size_t)run->n * sizeof *run->near);
+    status = uz_finite_place_find(&fits, &run->at, run, err);
+    if (status == UZ_OK && fits) { /* what is left of the way of supports and groups */
+        uz_finite_restrict(run->v, &run->at);
+        uz_finite_lead(run->trial.u, &run->at, run->v);
+        uz_rigid_step(run->trial.u, &run->base, run->at.u);
+        memcpy(run->at.u, run->trial.u, (size_t)run->n * sizeof *run->near);
+    }
+    return status;
 }
 
 /* Until the whole load is on, or no further part of it holds. Of a way that begins where another one has ended before

@@ -117,8 +117,12 @@ void uz_finite_lead(double *to, const uz_finite_place *place, const double *v)
     const uz_body_model *model = &place->turned;
     const int dim = model->mesh.dim;
     uz_recover_nodal(to, model, v, place->given);
-    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++)
-        to[i] += uz_is_rigid(model, i / dim) ? place->u[i] : 0;
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->n_rigid > 0; a++) {
+        double rigid[3];
+        uz_rigid_part(rigid, model, a, place->u);
+        for (int c = 0; c < dim; c++)
+            to[a * dim + c] += rigid[c];
+    }
 }
 
 /* Gaps as the rows have them, with supports where the load has them. */
@@ -381,23 +385,18 @@ void uz_finite_forget_factors(uz_finite_run *run)
     uz_table_forget(run->cache, UZ_ITEM_FACTOR);
 }
 
-/* What forces on the nodes of rigid groups do as these turn: of elements less those of loads and of obstacles. */
+/* What forces on the nodes of rigid groups do as these turn: of elements less those of loads and of contact. */
 static uz_status add_turning(uz_finite_run *run, uz_error *err)
 {
     const uz_finite_place *at = &run->at;
     const uz_body_model *rows = &at->rows;
-    const int dim = rows->mesh.dim;
     double *f = uz_alloc(run->n, sizeof *f), *force = uz_alloc(rows->m, sizeof *force);
     if (f && force) {
         for (int64_t i = 0; i < run->n; i++)
             f[i] = at->force[i] - at->loads[i];
-        if (run->n_r == rows->m)
+        if (run->n_r == rows->m) {
             uz_row_forces(force, rows, run->r);
-        for (int64_t i = 0; i < rows->m && run->n_r == rows->m; i++) {
-            const row_place place = place_of_row(at, i);
-            for (int c = 0; c < dim * place.n && rows->info.contact_face[2 * i] < 0; c++)
-                f[dim * place.node[c / dim] + c % dim] +=
-                    place.share[c / dim] * force[i] * rows->info.contact_normal[dim * i + c % dim];
+            uz_push_nodes(f, rows, force);
         }
         uz_rigid_turn_stiffness(&run->tangent, &run->base, at->u, f);
     }

@@ -1,0 +1,210 @@
+"""Contact between bodies of large deformation that are rigid in part, or tied; what is tied to rigid groups, and meshes that are refined
+beside them: by closed forms and by the same body said otherwise."""
+# not under ThreadSanitizer: about answers, not about threads
+import math
+
+import service
+from service import check
+from test_finite_supports import answer, scene
+from two_bodies import SOLID, body
+
+SHARED = True  # one service for all tests
+
+MATERIAL = {"on": "all", "young": 1.0, "poisson": 0.3, "law": "neo_hooke"}
+
+
+def farthest(one, other):
+    return max(math.dist(a, b) for a, b in zip(one["displacements"], other["displacements"]))
+
+
+def by_place(found):
+    return {tuple(round(c, 9) for c in x): u for x, u in zip(found["nodes"], found["displacements"])}
+
+
+# ---- rigid groups that touch
+
+def pressed(kind, supports, shift=0.0, rows=None, mirrored=False, **more):
+    """A block under a die that is narrower and slightly round; rows: of its elements so many from below are the group "rigid"."""
+    solid, sign = kind in SOLID, -1 if mirrored else 1
+    if solid:
+        cells, names = ((4, 2, 2), (2, 1, 2)), ("z0", "z1", "x0", "x1")
+        places = [lambda x, y, z: (4 * x, 2 * y, z),
+                  lambda x, y, z: (2 + shift + (0.6 + 0.3 * z) * (2 * x - 1), 0.1 + 1.8 * y, 1.01 + 0.1 * (2 * x - 1) ** 2 * (1 - z) + 0.5 * z)]
+    else:
+        cells, names = ((16, 4), (6, 4)), ("bottom", "top", "left", "right")
+        places = [lambda x, y: (sign * (4 * x - 2) + 2, y),
+                  lambda x, y: (2 + sign * (shift + (0.5 + 0.5 * y) * (2 * x - 1)), 1.02 + 0.1 * (2 * x - 1) ** 2 * (1 - y) + 0.5 * y)]
+        if mirrored:
+            places = [lambda x, y, place=place: place(1 - x, y) for place in places]
+    request = body((kind, kind), cells, places, {"floor": [(0, names[0])], "top": [(0, names[1])], "back": [(1, names[1])],
+                                                 "face": [(1, names[k]) for k in (0, 2, 3)]},
+                   model="solid" if solid else "plane_strain", kinematics="finite", materials=[MATERIAL],
+                   contacts=[{"on": "face", "with": "top", "smooth": False}],
+                   supports=[{"on": "floor", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}] + supports, **more)
+    mesh = request["problem"]["mesh"]
+    pieces = len(mesh["elements"][kind]) // sum(math.prod(n) for n in cells)
+    first, own = pieces * math.prod(cells[0]), pieces * math.prod(cells[1])
+    layers = cells[1][-1]
+    in_row = lambda e: e // pieces % layers if solid else e // (own // layers)
+    mesh["groups"]["die"] = {"elements": list(range(first, first + own))}
+    mesh["groups"]["rigid"] = {"elements": [first + e for e in range(own) if in_row(e) < (rows or layers)]}
+    mesh["groups"]["soft"] = {"elements": sorted(set(range(first + own)) - set(mesh["groups"]["rigid"]["elements"]))}
+    return request
+
+
+def test_a_rigid_die_is_one_that_is_prescribed(s):
+    """All of a die moved and turned, as a rigid group and by a support that turns its nodes: the same, to what is asked for."""
+    for kind, angle in (("quad4", 10), ("quad8", 10), ("tri6", -10), ("hex8", 0), ("hex20", 0), ("tet10", 0), ("wedge6", 0)):
+        solid = kind in SOLID
+        move = {"ux": 0.1, "uy": 0, "uz": -0.2} if solid else {"ux": 0.1, "uy": -0.25}
+        point = [2, 1, 1.5] if solid else [2, 1.5]
+        turn = {"rotation": {"about": point, "angle": angle}} if angle else {}
+        rigid = {"point": point, **move, **({"rx": 0, "ry": 0} if solid else {}), "rz": angle}
+        found = [answer(s, pressed(kind, [one])) for one in ({"on": "die", **move, **turn}, {"on": "die", "rigid": rigid})]
+        forces = [one["summary"]["resultants"]["contacts"][0]["force"] for one in found]
+        check(farthest(*found) < 1e-8 and math.dist(*forces) < 1e-8 and forces[0][-1] > 0.25, kind, farthest(*found), forces)
+        check(abs(found[1]["summary"]["finite"]["qps"] - found[0]["summary"]["finite"]["qps"]) <= 3, kind, [one["summary"]["finite"] for one in found])
+
+
+def test_a_rigid_foot_is_a_stiff_one(s):
+    """A die that is rigid below, where it touches, and soft above: it turns freely, as one that is 1e5 times stiffer there, bears no force of
+    its own, and mirrored answers are mirrored."""
+    for kind in ("quad4", "quad8", "hex8", "hex20"):
+        solid = kind in SOLID
+        back = {"on": "back", "ux": 0, "uy": 0, "uz": -0.2} if solid else {"on": "back", "ux": 0, "uy": -0.25}
+        foot = {"on": "rigid", "rigid": {"point": [2.3, 1, 1] if solid else [2.3, 1]}}
+        rows = 1 if solid else 2
+        rigid = answer(s, pressed(kind, [back, foot], shift=0.3, rows=rows))
+        request = pressed(kind, [back], shift=0.3, rows=rows)
+        request["problem"]["materials"] = [{**MATERIAL, "on": "soft"}, {**MATERIAL, "on": "rigid", "young": 1e5}]
+        stiff = answer(s, request)
+        group = rigid["summary"]["resultants"]["supports"][2]
+        check(farthest(rigid, stiff) < 1e-4 and max(map(abs, group["rigid"]["rotation"])) > 1e-3, kind, farthest(rigid, stiff), group)
+        check(math.hypot(*group["force"]) < 1e-7 and math.hypot(*group["rigid"]["moment"]) < 1e-7, kind, group)
+        if not solid:
+            foot["rigid"]["point"] = [1.7, 1]
+            other = answer(s, pressed(kind, [back, foot], shift=0.3, rows=rows, mirrored=True))
+            one, other = ([u[-1] for u in sorted(map(list, zip(((x[0] - 2) * sign for x in found["nodes"]), (x[1] for x in found["nodes"]),
+                                                                   (u[1] for u in found["displacements"]))), key=lambda at: (round(at[0], 9), round(at[1], 9)))]
+                          for found, sign in ((rigid, 1), (other, -1)))
+            check(max(abs(a - b) for a, b in zip(one, other)) < 1e-8, kind)
+
+
+def rocker(kind, force, rigid, cells):
+    """A round foot of radius 1 about the origin on a block; its head, 1 above the middle, has a dead load down and springs aside."""
+    solid, wide = kind in SOLID, 0.3
+    low = lambda x: (math.sin(0.9 * (2 * x - 1)), -math.cos(0.9 * (2 * x - 1)))
+    foot = lambda x, z: tuple((1 - z) * a + z * b for a, b in zip(low(x), (wide * (2 * x - 1), 1)))
+    lie = lambda at, y: (at[0], 0.25 * y, at[1])
+    places = [lambda x, y, z: lie((2 * x - 1, z - 2), y), lambda x, y, z: lie(foot(x, z), y)] if solid else [lambda x, y: (2 * x - 1, y - 2), foot]
+    names = ("z0", "z1") if solid else ("bottom", "top")
+    request = body((kind, kind), cells, places, {"floor": [(0, names[0])], "top": [(0, names[1])], "face": [(1, names[0])], "head": [(1, names[1])]},
+                   model="solid" if solid else "plane_strain", kinematics="finite", contacts=[{"on": "face", "with": "top", "smooth": False}],
+                   loads=[{"on": "head", "force": [0] * (2 if solid else 1) + [-force]}],
+                   supports=[{"on": "floor", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, {"on": "head", "spring": [0.05, *([0] if solid else []), 1e-3]}])
+    problem, n = request["problem"], [math.prod(c) for c in cells]
+    middle = [k for k, x in enumerate(problem["mesh"]["nodes"]) if abs(x[0]) < 1e-9 and abs(x[-1]) < 1e-9]
+    problem["mesh"]["groups"].update({"soft": {"elements": list(range(n[0]))}, "die": {"elements": list(range(n[0], sum(n)))}, "middle": {"nodes": middle}})
+    aside = {"uy": 0, "rx": 0, "rz": 0} if solid else {}
+    problem["supports"] += ([{"on": "die", "rigid": {"point": [0, 0, 0][:3 if solid else 2], "ux": 0, **aside}}] if rigid else
+                            [{"on": "middle", "ux": 0}] + ([{"on": "die", "uy": 0}] if solid else []))
+    problem["materials"] = [{**MATERIAL, "on": "soft"}, {**MATERIAL, "on": "die", "young": 3e3}]
+    return request
+
+
+def test_a_rocker_tips(s):
+    """What a rigid rocker bears upright is what a stiff one bears: its normals that turn, the ways of its nodes that bend under load and
+    contact, and its springs each have a part in it that is several times what is allowed here. The
+    foot's surface is the slave of the contact, or its master."""
+    for kind, force, cells in (("quad8", 0.09, ((16, 3), (24, 2))), ("quad8", 0.09, ((24, 3), (12, 2)))):
+        borne = []
+        for rigid in (True, False):
+            found = answer(s, rocker(kind, force, rigid, cells), "unstable", forces=False)["summary"]
+            borne.append(found["finite"]["load"])
+        check(abs(borne[0] / borne[1] - 1) < 0.01 and 0.4 < borne[0] < 0.9, kind, cells, borne)
+
+
+# ---- ties at contact
+
+def test_tied_parts_touch_as_one(s):
+    """A block of two parts side by side, tied, that is pressed over the joint by another one: as the block in one part."""
+    for kind in ("quad4", "quad8", "hex8", "hex20"):
+        solid = kind in SOLID
+        found = []
+        for tied in (True, False):
+            extra = (2,) if solid else ()
+            third = lambda *r: r
+            halves = [lambda x, *r: (2 * x, *r), lambda x, *r: (2 + 2 * x, *r)] if tied else [lambda x, *r: (4 * x, *r)]
+            if solid:
+                low, high, side = "z0", "z1", ("x1", "x0")
+                die = lambda x, y, z: (1.3 + 1.4 * x, -0.1 + 1.2 * y, 1 + 0.1 * (2 * x - 1) ** 2 * (1 - z) + 0.5 * z)
+                cells = ([(4, 2, 2)] * 2 if tied else [(8, 2, 2)]) + [(5, 4, 1)]
+            else:
+                low, high, side = "bottom", "top", ("right", "left")
+                die = lambda x, y: (1.3 + 1.4 * x, 1 + 0.1 * (2 * x - 1) ** 2 * (1 - y) + 0.5 * y)
+                cells = ([(8, 4)] * 2 if tied else [(16, 4)]) + [(10, 2)]
+            n = len(halves)
+            groups = {"floor": [(k, low) for k in range(n)], "top": [(k, high) for k in range(n)], "face": [(n, low)], "back": [(n, high)]}
+            if tied:
+                groups.update({"first": [(0, side[0])], "second": [(1, side[1])]})
+            down = {"ux": 0.1, "uy": 0, "uz": -0.15} if solid else {"ux": 0.1, "uy": -0.2}
+            request = body([kind] * (n + 1), cells, halves + [die], groups, model="solid" if solid else "plane_strain", kinematics="finite", materials=[MATERIAL],
+                           contacts=[{"on": "face", "with": "top", "smooth": False}], **({"ties": [{"on": "first", "to": "second"}]} if tied else {}),
+                           supports=[{"on": "floor", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, {"on": "back", **down}])
+            found.append(answer(s, request))
+        tied, one = map(by_place, found)
+        off = max(math.dist(one[at], tied[at]) for at in one)
+        check(off < 1e-8 and set(one) == set(tied) and found[0]["summary"]["resultants"]["contacts"][0]["force"][-1] > 0.05, kind, off, found[0]["summary"]["resultants"])
+
+
+def test_what_is_tied_to_a_rigid_group_goes_with_it(s):
+    """A strip on a rigid block that it is tied to, and which turns by 50 degrees or freely, as a strip whose foot is rigid itself."""
+    for kind, turn in (("quad4", {"rz": 50, "ux": 0, "uy": 0}), ("quad8", {"rz": 50, "ux": 0, "uy": 0}), ("quad8", {}), ("hex8", {"rx": 0, "ry": 0, "rz": 50}),
+                       ("hex20", {})):
+        solid, found = kind in SOLID, []
+        for tied in (True, False):
+            cells = [(2, 8, 1)[:3 if solid else 2], (2, 1, 1)[:3 if solid else 2]]
+            places = [lambda x, y, *z: (x, 8 * y, *z), lambda x, y, *z: (x, y - 1, *z)]
+            sides = ("y0", "y1") if solid else ("bottom", "top")
+            groups = {"foot": [(0, sides[0])], "head": [(0, sides[1])], "base": [(1, sides[1])]}
+            point = [0.5, -0.5, 0][:3 if solid else 2]
+            held = {"ux": 0, "uy": 0, **({"uz": 0} if solid else {})}
+            supports = [{"on": "block" if tied else "foot", "rigid": {"point": point, **turn}}]
+            free = not turn
+            supports.append({"on": "head", **held} if free or "ux" not in turn else {"on": "head", "ux": 0})
+            load = [{"on": "base" if tied else "foot", "force": [0.01, 0.02, 0.0][:3 if solid else 2]}] if free else []
+            request = body([kind] * (2 if tied else 1), cells[:2 if tied else 1], places[:2 if tied else 1],
+                           {name: sides for name, sides in groups.items() if tied or name != "base"}, model="solid" if solid else "plane_strain",
+                           kinematics="finite", materials=[MATERIAL], supports=supports, loads=load, **({"ties": [{"on": "foot", "to": "base"}]} if tied else {}))
+            if tied:
+                n = math.prod(cells[0])
+                request["problem"]["mesh"]["groups"]["block"] = {"elements": list(range(n, n + 2))}
+            found.append(answer(s, request))
+        tied, one = map(by_place, found)
+        off = max(math.dist(one[at], tied[at]) for at in one)
+        moved = max(math.hypot(*u) for u in one.values())
+        check(off < 1e-8 and moved > 0.3, kind, turn, off, moved)
+
+
+# ---- meshes that are refined beside rigid groups
+
+def test_meshes_are_refined_beside_rigid_groups(s):
+    """A strip whose end turns by 40 degrees, as a rigid group and by a support that turns it: the same meshes and answers, also where nodes
+    hang beside it."""
+    for kind, solid in (("quad4", False), ("quad8", False), ("tri6", False), ("hex8", True)):
+        found = []
+        for rigid in (False, True):
+            point = [2, 0.5, 0.5][:3 if solid else 2]
+            to = {"ux": 0.1, "uy": 0.2, **({"uz": 0} if solid else {})}
+            motion = {"rigid": {"point": point, **to, **({"rx": 0, "ry": 0} if solid else {}), "rz": 40}} if rigid else {**to, "rotation": {"about": point, "angle": 40, **({"axis": [0, 0, 1]} if solid else {})}}
+            request = scene(model="solid" if solid else "plane_strain", supports=[{"on": "left", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, {"on": "right", **motion}],
+                            mesh={"box": {"size": [2, 1, 1][:3 if solid else 2], "cells": [2, 1, 1][:3 if solid else 2], "element": kind}, "refine": "auto"})
+            found.append(answer(s, {**request, "solver": {"accuracy": {"total": 0.3 if solid else 0.1}}}, forces=False))
+        prescribed, rigid = map(by_place, found)
+        check(set(prescribed) == set(rigid) and len(rigid) > 20, kind, len(prescribed), len(rigid))
+        qps = [one["summary"]["finite"]["qps"] for one in found]
+        check(max(math.dist(prescribed[at], rigid[at]) for at in rigid) < 1e-8 and qps[0] == qps[1], kind, qps)
+
+
+if __name__ == "__main__":
+    service.main(globals())
