@@ -50,10 +50,6 @@ uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings 
                        "cells are chosen by the error of small deformation; give their numbers where kinematics are "
                        "finite");
     const bool refines = problem->scene.refine;
-    if (refines && !uz_is_finite(problem)) /* before what it asks of the accuracy */
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
-                       "a mesh is refined by the error of one model, and auto may take either: ask for the kinematics "
-                       "\"finite\", or give a mesh");
     if (settings->guaranteed || settings->quantity_error > 0 ||
         (!refines && (settings->total_error > 0 || settings->balanced)))
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",

@@ -167,6 +167,82 @@ bool uz_is_weighed(const uz_problem *problem)
            uz_has_finite_law(&problem->scene);
 }
 
+/* Of a case whose mesh was refined for small deformation: what that errs by there; *compared: false where that is
+ * surely little. */
+static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
+                               const uz_hooks *hooks, double deadline, uz_error *err)
+{
+    uz_problem one = uz_problem_of_case(problem, i);
+    uz_settings coarse = uz_settings_default();
+    uz_result *large = NULL;
+    uz_error own = {0};
+    const uz_outcome outcome = result->summary.outcome;
+    /* what the mesh is short of says nothing of the model */
+    result->summary.outcome = outcome == UZ_MESH_LIMIT ? UZ_CONVERGED : outcome;
+    *compared = is_asked(result, &one, true);
+    result->summary.outcome = outcome;
+    if (!*compared)
+        return UZ_OK;
+    one.scene.kinematics = UZ_KINEMATICS_FINITE;
+    one.scene.bisected = result->grids->bisected;
+    one.scene.n_bisected = result->grids->n_bisected;
+    one.n_quantities = 0;
+    coarse.relative_error = COMPARED_TO;
+    const uz_status status = uz_solve_finite_load(&large, &one, &coarse, hooks, deadline, result, NULL, &own);
+    if (status == UZ_ERR_FREE_BODY)
+        return refuse_free(result, &own, err);
+    if (status != UZ_OK) {
+        if (err)
+            *err = own;
+        return status;
+    }
+    *small = large->summary.small;
+    count_both(&result->summary, &large->summary);
+    uz_result_free(large);
+    return UZ_OK;
+}
+
+/* On a mesh that is refined for small deformation; where that is not enough, for one of the cases, on another one, that
+ * is refined for large deformation, for all of them. */
+static uz_status solve_refined(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                               const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
+    const double deadline = uz_seconds() + settings->time_limit_s;
+    uz_small *small = uz_alloc_zero(n, sizeof *small);
+    uz_timings *spent = uz_alloc_zero(n, sizeof *spent);
+    bool enough = true;
+    uz_status status = small && spent ? uz_solve_grid_sequence(results, problem, settings, starts, cache, hooks, err)
+                                      : uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for %lld cases", (long long)n);
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        bool compared;
+        status = weigh_refined(&small[i], &compared, results[i], problem, i, hooks, deadline, err);
+        if (status != UZ_OK && problem->n_cases > 0)
+            uz_error_name_case(err, problem, i);
+        enough = enough && (!compared || small[i].error <= TOLERABLE);
+        spent[i] = results[i]->summary.timings;
+    }
+    if (status == UZ_OK && !enough) {
+        uz_problem large = *problem;
+        uz_settings rest = *settings;
+        large.scene.kinematics = UZ_KINEMATICS_FINITE;
+        rest.time_limit_s = fmax(0.0, deadline - uz_seconds());
+        for (int64_t i = 0; i < n; i++) {
+            uz_result_free(results[i]);
+            results[i] = NULL;
+        }
+        status = uz_solve_grid_sequence(results, &large, &rest, NULL, cache, hooks, err);
+    }
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        results[i]->summary.small = small[i];
+        if (!enough)
+            uz_timings_add(&results[i]->summary.timings, &spent[i]);
+    }
+    free(small);
+    free(spent);
+    return status;
+}
+
 uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                            const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
@@ -175,5 +251,8 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
         status = uz_check_finite_settings(problem, settings, err);
-    return status == UZ_OK ? uz_solve_given(results, problem, settings, starts, cache, hooks, err) : status;
+    if (status != UZ_OK)
+        return status;
+    return problem->scene.refine ? solve_refined(results, problem, settings, starts, cache, hooks, err)
+                                 : uz_solve_given(results, problem, settings, starts, cache, hooks, err);
 }

@@ -465,7 +465,6 @@ def test_what_is_not_modelled_is_refused(s):
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
              (block(kinematics="auto", stabilize=True, supports=[{"on": "top", "uy": -0.3}]), "/problem/stabilize", "springs of your own"),
              (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
-              (block(kinematics="auto", mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "/problem/mesh/refine", "finite"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
                "/solver/accuracy", "leave guaranteed out"),
               ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "refine the mesh")]

@@ -206,5 +206,34 @@ def test_meshes_are_refined_beside_rigid_groups(s):
         check(max(math.dist(prescribed[at], rigid[at]) for at in rigid) < 1e-8 and qps[0] == qps[1], kind, qps)
 
 
+def test_auto_refines_for_the_model_that_it_takes(s):
+    """A strip that bends much and little: the mesh, the answer and what small deformation errs by are those of the model that is taken,
+    and of several loads one that needs large deformation decides for all."""
+    def solved(kinematics, *loads, total=0.08):
+        lawful = kinematics != "fixed"
+        request = scene(kinematics=kinematics, supports=[{"on": "left", "ux": 0, "uy": 0}],
+                        mesh={"box": {"size": [8, 1], "cells": [8, 1], "element": "quad8"}, "refine": "auto"})
+        request["problem"]["materials"][0].update({} if lawful else {"law": "linear"})
+        load = lambda force: [{"on": "right", "traction": [0, -force]}]
+        request.update({"cases": [{"name": f"{force:g}", "loads": load(force)} for force in loads]} if len(loads) > 1 else {})
+        request["problem"].update({} if len(loads) > 1 else {"loads": load(loads[0])})
+        job = s.post({**request, "solver": {"accuracy": {"total": total}}}).json["id"]
+        check(s.wait_status(job, "successful", "failed")["status"] == "successful", kinematics, loads)
+        found = [s.get(f"/v1/jobs/{job}/result?fields=summary,displacements,nodes{name}").json
+                 for name in ([f"&case={force:g}" for force in loads] if len(loads) > 1 else [""])]
+        check(all(one["summary"]["outcome"] == "converged" and one["summary"]["error"]["total"] <= total for one in found), kinematics, [one["summary"] for one in found])
+        return found
+    much, little = 2e-3, 1e-5
+    for force, model in ((much, "finite"), (little, "fixed")):
+        (auto,), (own,) = solved("auto", force), solved(model, force)
+        check(auto["nodes"] == own["nodes"] and farthest(auto, own) < 1e-6 * max(math.hypot(*u) for u in own["displacements"]), model)
+        check(("finite" in auto["summary"]) == (model == "finite"), auto["summary"])
+        small = auto["summary"].get("small_deformation", {"error": 0})
+        check((small["error"] > 0.05) == (model == "finite"), small)
+    both, own = solved("auto", little, much), solved("finite", little, much)
+    for one, other in zip(both, own):
+        check(one["nodes"] == other["nodes"] and farthest(one, other) < 1e-6 and "finite" in one["summary"], one["summary"])
+
+
 if __name__ == "__main__":
     service.main(globals())
