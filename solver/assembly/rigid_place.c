@@ -130,6 +130,33 @@ static void displacement(double *u, const uz_body_model *model, const uz_rigid_g
     }
 }
 
+void uz_rigid_point(double at[3], const uz_body_model *model, const uz_rigid_group *group, const double point[3],
+                    const double *u)
+{
+    double t[3], R[9];
+    uz_rigid_place(t, R, model, group, u);
+    for (int i = 0; i < 3; i++) {
+        at[i] = group->point[i] + t[i];
+        for (int j = 0; j < 3; j++)
+            at[i] += R[3 * i + j] * (point[j] - group->point[j]);
+    }
+}
+
+void uz_add_bend(double G[9], const double f[3], const double r[3])
+{
+    for (int i = 0; i < 9; i++)
+        G[i] += 0.5 * (f[i / 3] * r[i % 3] + r[i / 3] * f[i % 3]) - (i % 4 == 0 ? uz_dot3(f, r) : 0);
+}
+
+void uz_add_turn_block(uz_body_model *to, const uz_rigid_group *group, const double G[9])
+{
+    const int dim = to->mesh.dim;
+    double block[9] = {0};
+    for (int i = 0; i < (dim == 2 ? 1 : 9); i++)
+        block[i] = (dim == 2 ? G[8] : G[i]) / (group->size * group->size);
+    uz_add_dof_block(to, group->anchor[1], group->anchor[1], block);
+}
+
 uz_status uz_body_turned(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err)
 {
     *out = *model;
@@ -293,7 +320,7 @@ void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, cons
     leave_followers(f, model);
     for (int64_t k = 0; k < model->n_rigid && model->kind != UZ_AXISYMMETRIC; k++) {
         const uz_rigid_group *group = &model->rigid[k];
-        double t[3], R[9], G[9] = {0}, block[9] = {0};
+        double t[3], R[9], G[9] = {0};
         uz_rigid_place(t, R, model, group, u);
         for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
             double r[3], force[3] = {0};
@@ -303,12 +330,8 @@ void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, cons
             for (int c = 0; c < 3; c++)
                 r[c] -= group->point[c] + t[c];
             memcpy(force, f + a * dim, (size_t)dim * sizeof *force);
-            for (int i = 0; i < 9; i++)
-                G[i] +=
-                    0.5 * (force[i / 3] * r[i % 3] + r[i / 3] * force[i % 3]) - (i % 4 == 0 ? uz_dot3(force, r) : 0);
+            uz_add_bend(G, force, r);
         }
-        for (int i = 0; i < (dim == 2 ? 1 : 9); i++)
-            block[i] = (dim == 2 ? G[8] : G[i]) / (group->size * group->size);
-        uz_add_dof_block(to, group->anchor[1], group->anchor[1], block);
+        uz_add_turn_block(to, group, G);
     }
 }

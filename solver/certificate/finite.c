@@ -529,6 +529,8 @@ static uz_status leave_over(work *w, uz_error *err)
         uz_gather_nodal(w->f, model, nodal);
         uz_csc_gaxpy_t(w->f, &model->N, 1, w->of->r);
         status = model->n_rigid > 0 ? uz_rigid_groups_bend(&w->tangent, nodal, w->of, err) : UZ_OK;
+        if (status == UZ_OK)
+            status = uz_rigid_groups_load(w->f, &w->tangent, w->of, err);
     }
     free(nodal);
     return status;

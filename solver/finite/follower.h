@@ -1,4 +1,5 @@
-/* follower.h: pressures that turn and grow with the deformed sides that they act on.
+/* follower.h: loads that follow the body: forces at points of rigid groups, and pressures, which turn and grow with the
+ * deformed sides that they act on.
  *
  * With x the places of a side's nodes, f_a = -p integral N_a n da over the deformed side. In plane stress a side has
  * the thickness that it had at rest. The derivative of f is symmetric as a whole where the sides close a volume, or

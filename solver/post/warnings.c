@@ -200,8 +200,12 @@ static void look_at_small_only(const doubts *d)
     const char *what = partly ? "rigid groups of which one rotation is held" : NULL;
     for (int64_t k = 0; k < d->model->n_materials; k++)
         what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
-    for (int64_t k = 0; k < d->scene->n_loads; k++)
-        what = d->scene->loads[k].has_point ? "forces at a point" : what;
+    for (int64_t k = 0; k < d->scene->n_loads; k++) {
+        const uz_load *load = &d->scene->loads[k];
+        const uz_group *group = load->has_point ? uz_mesh_group(&d->model->mesh, load->on, "", NULL) : NULL;
+        if (group && !uz_is_rigid(d->model, uz_group_node_at(group, 0)))
+            what = "forces at a point";
+    }
     if (what && d->out->nonlinear > UZ_MOST_SLIDING)
         warn(d->out, "large_deformation", d->out->nonlinear,
              "small deformation errs by some %.2g %% as rotations are large, and %s have no other: put less load on it",

@@ -68,6 +68,8 @@ static void scale_load(uz_load *out, const uz_load *from, double factor)
 {
     for (int c = 0; c < 3; c++)
         out->v[c] = factor * from->v[c];
+    for (int c = 0; c < 3; c++)
+        out->moment[c] = factor * from->moment[c];
     out->value = factor * from->value;
 }
 

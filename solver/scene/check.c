@@ -224,7 +224,7 @@ uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_err
     char where[UZ_CHECK_POINTER];
     uz_status status = check_supports_and_contacts(scene, mesh, err);
     if (status == UZ_OK)
-        status = uz_check_finite_loads(scene, err);
+        status = uz_check_finite_loads(scene, mesh, err);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
         const uz_load *load = &scene->loads[i];
         if (load->kind >= UZ_LOAD_KINDS)

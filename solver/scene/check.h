@@ -29,7 +29,7 @@ uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i
 /* Finite kinematics may be what it is solved with. */
 bool uz_may_be_finite(const uz_scene *scene);
 uz_status uz_check_finite_body(const uz_scene *scene, uz_error *err);
-uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err);
+uz_status uz_check_finite_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
 /* Does a temperature do anything to it? */
 bool uz_expands(const uz_material *material);
 uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);

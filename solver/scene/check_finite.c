@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -121,14 +122,48 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
-static uz_status check_loads(const uz_scene *scene, uz_error *err)
+/* *rigid: are all nodes of a group of one that is rigid? mesh NULL: is there any that is? */
+static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *mesh, const char *on, uz_error *err)
+{
+    const uz_group *group = mesh ? uz_mesh_group(mesh, on, "", NULL) : NULL; /* is not there: that is told elsewhere */
+    *rigid = false;
+    for (int64_t k = 0; k < scene->n_supports && !*rigid; k++) {
+        if (scene->supports[k].kind != UZ_SUPPORT_RIGID)
+            continue;
+        const uz_group *whole = group ? uz_mesh_group(mesh, scene->supports[k].on, "", NULL) : NULL;
+        unsigned char *of = whole ? uz_alloc_zero(mesh->n_nodes, sizeof *of) : NULL;
+        if (whole && !of)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the nodes of a rigid group");
+        for (int64_t i = 0; of && i < uz_group_node_count(mesh, whole); i++)
+            of[uz_group_node_at(whole, i)] = 1;
+        *rigid = !group || of;
+        for (int64_t i = 0; of && i < uz_group_node_count(mesh, group) && *rigid; i++)
+            *rigid = of[uz_group_node_at(group, i)];
+        free(of);
+    }
+    return UZ_OK;
+}
+
+/* mesh: as of find_rigid. */
+static uz_status check_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_loads; i++) {
-        if (scene->loads[i].has_point)
+        const double *moment = scene->loads[i].moment;
+        bool rigid = true;
+        const uz_status status =
+            scene->loads[i].has_point ? find_rigid(&rigid, scene, mesh, scene->loads[i].on, err) : UZ_OK;
+        if (status != UZ_OK)
+            return status;
+        if (!rigid)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
-                           "what turns is not where it was, and finite kinematics have forces that stay: leave at and "
-                           "moment out, or use the kinematics \"moving\"");
+                           "where the body goes a point goes with rigid groups alone: make \"%.63s\" such a group by a "
+                           "support with rigid, leave at and moment out, or use the kinematics \"moving\"",
+                           scene->loads[i].on);
+        if (scene->loads[i].has_point && scene->model == UZ_SOLID && uz_dot3(moment, moment) > 0)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "moment"),
+                           "the work of a moment that keeps its direction depends on the way in space: turn the group "
+                           "by rx, ry and rz, or put forces on its points");
         if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE && !uz_may_be_finite(scene))
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
                            "small deformation of the linear law is not compared with large where there is temperature");
@@ -171,13 +206,13 @@ uz_status uz_check_finite_size(const uz_scene *scene, const uz_mesh *mesh, uz_er
                    UZ_MOST_FINITE_DOFS, (long long)d);
 }
 
-uz_status uz_check_finite_loads(const uz_scene *scene, uz_error *err)
+uz_status uz_check_finite_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     const uz_status status = uz_check_finite_body(scene, err); /* the body may be one of other kinematics */
-    return status == UZ_OK && uz_may_be_finite(scene) ? check_loads(scene, err) : status;
+    return status == UZ_OK && uz_may_be_finite(scene) ? check_loads(scene, mesh, err) : status;
 }
 
 bool uz_has_finite_model(const uz_scene *scene)
 {
-    return check_body(scene, NULL) == UZ_OK && check_loads(scene, NULL) == UZ_OK;
+    return check_body(scene, NULL) == UZ_OK && check_loads(scene, NULL, NULL) == UZ_OK;
 }

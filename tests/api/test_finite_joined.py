@@ -1,11 +1,11 @@
-"""Contact between bodies of large deformation that are rigid in part, or tied; what is tied to rigid groups, and meshes that are refined
-beside them: by closed forms and by the same body said otherwise."""
+"""Contact between bodies of large deformation that are rigid in part, or tied; what is tied to rigid groups, meshes that are refined
+beside them, and forces at points of them: by closed forms and by the same body said otherwise."""
 # not under ThreadSanitizer: about answers, not about threads
 import math
 
 import service
 from service import check
-from test_finite_supports import answer, scene
+from test_finite_supports import answer, refused, scene
 from two_bodies import SOLID, body
 
 SHARED = True  # one service for all tests
@@ -233,6 +233,71 @@ def test_auto_refines_for_the_model_that_it_takes(s):
     both, own = solved("auto", little, much), solved("finite", little, much)
     for one, other in zip(both, own):
         check(one["nodes"] == other["nodes"] and farthest(one, other) < 1e-6 and "finite" in one["summary"], one["summary"])
+
+
+# ---- forces at points of rigid groups
+
+def test_a_force_beside_a_rigid_side_is_one_on_a_rigid_block(s):
+    """A dead force at a point beyond a strip's end, which is rigid, and on the end of a rigid block there: the same however far it turns,
+    with the same head that buckles, in the plane and in space."""
+    for solid, force, outcome in ((False, [0, 1e-4], "converged"), (False, [-1e-5, 1e-5], "converged"), (False, [-1e-3, 0], "unstable"), (True, [0, 0.01, 0.006], "converged")):
+        found = []
+        for block in (True, False):
+            kind, n = ("hex20", 6) if solid else ("quad8", 20)
+            thick = 0.5 if solid else 0.1
+            rest = (1, 1) if solid else (1,)
+            places = [lambda x, *r: (10 * x, *(thick * c for c in r)), lambda x, *r: (10 + 3 * x, *(thick * c for c in r))]
+            names = ("x0", "x1") if solid else ("left", "right")
+            groups = {"clamp": [(0, names[0])], "end": [(0, names[1])], **({"far": [(1, names[1])]} if block else {})}
+            load = {"on": "far", "force": force} if block else {"on": "end", "force": force, "at": [13] + [thick / 2] * (2 if solid else 1)}
+            request = body([kind] * (1 + block), [(n, *rest), (1, *rest)][:1 + block], places[:1 + block], groups, model="solid" if solid else "plane_strain",
+                           kinematics="finite", materials=[MATERIAL], loads=[load],
+                           supports=[{"on": "clamp", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})},
+                                     {"on": "block" if block else "end", "rigid": {"point": [10, 0, 0][:3 if solid else 2]}}])
+            if block:  # one group with the side of the strip
+                mesh = request["problem"]["mesh"]
+                ends = sorted(k for k, x in enumerate(mesh["nodes"]) if x[0] > 10 - 1e-9)
+                mesh["groups"]["block"] = {"nodes": ends}
+            found.append(answer(s, request, outcome, forces=False))
+        for name in ("displacement", "rotation"):
+            pair = [one["summary"]["resultants"]["supports"][1]["rigid"][name] for one in found]
+            check(math.dist(*pair) < 1e-6 * (1 + math.hypot(*pair[0])), solid, force, name, pair)
+        check(found[0]["summary"]["finite"]["load"] == found[1]["summary"]["finite"]["load"] and
+              (outcome == "unstable" or found[1]["summary"]["finite"]["qps"] <= 1.2 * found[0]["summary"]["finite"]["qps"]),
+              [one["summary"]["finite"] for one in found])
+        loads = [one["summary"]["resultants"]["loads"] for one in found]
+        check(math.dist(loads[0]["force"], loads[1]["force"]) < 1e-9 and math.dist(loads[0]["moment"], loads[1]["moment"]) < 1e-6, loads)
+        check(outcome == "unstable" or math.hypot(*found[1]["summary"]["resultants"]["supports"][1]["rigid"]["displacement"]) > 0.5, found[1]["summary"]["resultants"])
+
+
+def test_a_moment_rolls_a_strip_up(s):
+    """Whose end is rigid: by a moment as the rotation takes that it makes, and to a circle, in steps of which each follows the one before."""
+    length, thick, angle = 10.0, 0.1, 150
+    def strip(rigid, **more):
+        return scene("st_venant_kirchhoff", 0, mesh={"box": {"size": [length, thick], "cells": [20, 1], "element": "quad8"}},
+                     supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "rigid": {"point": [length, 0], **rigid}}], **more)
+    turned = answer(s, strip({"rz": angle}))
+    moment = turned["summary"]["resultants"]["supports"][1]["rigid"]["moment"][0]
+    check(abs(moment / (thick ** 3 / 12 * math.radians(angle) / length) - 1) < 0.02, moment)
+    load = [{"on": "right", "force": [0, 0], "at": [length, 0], "moment": [moment]}]
+    rolled = answer(s, strip({}, loads=load))
+    group = rolled["summary"]["resultants"]["supports"][1]
+    check(farthest(turned, rolled) < 1e-5 and abs(group["rigid"]["rotation"][0] - angle) < 1e-5 and math.hypot(*group["force"]) < 1e-9, group, farthest(turned, rolled))
+    job = s.post({**strip({}, loads=load), "cases": [{"name": "way", "steps": [0.5, 1, 0.6]}]}).json["id"]
+    check(s.wait_status(job, "successful", "failed")["status"] == "successful", job)
+    last = s.get(f"/v1/jobs/{job}/result?fields=summary&case=way").json["summary"]
+    check(abs(last["resultants"]["supports"][1]["rigid"]["rotation"][0] - 0.6 * angle) < 0.01 * angle and last["outcome"] == "converged", last["resultants"])
+
+
+def test_points_that_go_with_nothing(s):
+    for model, rigid, load, pointer, word in (("plane_strain", "left", {"force": [0, 1], "at": [2, 1]}, "at", "by a support with rigid"),
+                                              ("plane_strain", None, {"force": [0, 1], "at": [2, 1]}, "at", "by a support with rigid"),
+                                              ("solid", "right", {"force": [0, 1, 0], "at": [2, 1, 0], "moment": [1, 0, 0]}, "moment", "rx, ry and rz")):
+        dim = 3 if model == "solid" else 2
+        held = {"on": "top", "ux": 0, "uy": 0, **({"uz": 0} if dim == 3 else {})} if rigid == "left" else {"on": "left", "ux": 0, "uy": 0, **({"uz": 0} if dim == 3 else {})}
+        for kinematics in ("finite", "auto"):
+            refused(s, scene(model=model, kinematics=kinematics, mesh={"box": {"size": [2, 1, 1][:dim], "cells": [2, 1, 1][:dim]}}, loads=[{"on": "right", **load}],
+                             supports=[held, *([{"on": rigid, "rigid": {"point": [0, 0, 0][:dim]}}] if rigid else [])]), f"/loads/0/{pointer}", word)
 
 
 if __name__ == "__main__":

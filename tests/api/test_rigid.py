@@ -260,9 +260,6 @@ def test_what_is_not_proved_says_so(s):
 def test_refusals(s):
     refused(s, beam([0, 1], [10, 0], rigid={"rx": 1}), "/supports/1/rigid/rx", "ux, uy and rz")
     refused(s, beam([0, 1], [10, 0], rigid={"rz": 60}), "/supports/1/rigid/rz", "not small")
-    finite = beam([0, 1], [10, 0], kinematics="finite")
-    finite["problem"]["materials"][0]["law"] = "neo_hooke"
-    refused(s, finite, "/loads/0/at", "what turns is not where it was")
     twice = beam([0, 1], [10, 0])
     twice["problem"]["supports"].append({"on": "top", "rigid": {"point": [0, 0]}})
     refused(s, twice, "/supports/2/on", "make one group")
