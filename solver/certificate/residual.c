@@ -9,6 +9,7 @@
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -169,9 +170,9 @@ typedef struct {
     four hi4[2], lo4[2];
 } pair_sums;
 
-static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64_t j)
+static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64_t j, int64_t end_of_all)
 {
-    if (j + 1 >= A->cols)
+    if (j + 1 >= end_of_all)
         return false;
     const int64_t k = A->ptr[j], l = A->ptr[j + 1], end = A->ptr[j + 2];
     return l - k == end - l + 1 && l - k >= 2 && A->idx[k] == j && A->idx[k + 1] == j + 1 && A->idx[l] == j + 1;
@@ -279,11 +280,11 @@ static inline __attribute__((always_inline)) void finish_four(const uz_residuals
     AT(four, out->Ku + j) = Ku;
 }
 
-static inline __attribute__((always_inline)) void multiply(const product_of *q, int fused)
+static inline __attribute__((always_inline)) void multiply(const product_of *q, int64_t begin, int64_t end, int fused)
 {
-    for (int64_t j = 0; j < q->A->cols; j++) {
+    for (int64_t j = begin; j < end; j++) {
         prepare_column(q, j);
-        if (is_pair(q->A, j)) {
+        if (is_pair(q->A, j, end)) {
             prepare_column(q, j + 1);
             take_pair(q, j++, fused);
         } else {
@@ -292,14 +293,14 @@ static inline __attribute__((always_inline)) void multiply(const product_of *q, 
     }
 }
 
-UZ_AVX2_FMA static void multiply_fused(const product_of *q)
+UZ_AVX2_FMA static void multiply_fused(void *ctx, int64_t begin, int64_t end)
 {
-    multiply(q, 1);
+    multiply(ctx, begin, end, 1);
 }
 
-static void multiply_split(const product_of *q)
+static void multiply_split(void *ctx, int64_t begin, int64_t end)
 {
-    multiply(q, 0);
+    multiply(ctx, begin, end, 0);
 }
 
 static inline __attribute__((always_inline)) void finish(const uz_residuals *out, const double *lo, const uz_csc *N,
@@ -345,7 +346,7 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
             out->weight[j] = uz_dof_weight(K, j);
         status = uz_brick_precise_product(out->Ku, lo, out->Kc, out->brick, u, c, err);
     } else {
-        (uz_cpu_has_avx2_fma() ? multiply_fused : multiply_split)(&product);
+        uz_by_columns(uz_cpu_has_avx2_fma() ? multiply_fused : multiply_split, &product, K);
     }
     (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(out, lo, N, p, r);
     return status;
@@ -362,18 +363,33 @@ double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double 
     return sum.hi + sum.lo;
 }
 
+/* Sums of rows as columns of K and N count them. */
+typedef struct {
+    const uz_csc *K, *N;
+    const uz_brick *brick;
+    int64_t *count;
+} counting;
+
+static void count_terms(void *ctx, int64_t begin, int64_t end)
+{
+    const counting *x = ctx;
+    const uz_csc *K = x->K, *N = x->N;
+    int64_t *count = x->count;
+    for (int64_t j = begin; j < end; j++) {
+        const int64_t own = x->brick ? UZ_BRICK_NODES * UZ_BRICK_DOFS : K->ptr[j + 1] - K->ptr[j];
+        count[j] += own + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            count[K->idx[k]] += K->idx[k] != j;
+    }
+}
+
 int64_t uz_most_terms(const uz_csc *K, const uz_brick *brick, const uz_csc *N)
 {
     const int64_t room = K->rows > N->rows ? K->rows : N->rows;
     int64_t most = 1, *count = uz_alloc_zero(room, sizeof *count);
     if (!count)
         return -1;
-    for (int64_t j = 0; j < K->cols; j++) {
-        const int64_t own = brick ? UZ_BRICK_NODES * UZ_BRICK_DOFS : K->ptr[j + 1] - K->ptr[j];
-        count[j] += own + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
-            count[K->idx[k]] += K->idx[k] != j;
-    }
+    uz_by_columns(count_terms, &(counting){K, N, brick, count}, K);
     for (int64_t j = 0; j < K->cols; j++)
         most = count[j] + 2 > most ? count[j] + 2 : most; /* p and K c */
     memset(count, 0, (size_t)room * sizeof *count);

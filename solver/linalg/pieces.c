@@ -38,6 +38,70 @@ void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx,
     divide(run, ctx, n, n / LEAST);
 }
 
+/* -------------------------------------------------------------------- columns */
+
+/* Parts that columns are in, where there are so many; columns that are looked at, then run. */
+enum { COLUMN_PARTS = 4, COLUMNS_LEAST = 32768, COLUMNS_AT_ONCE = 512 };
+
+typedef struct {
+    void (*run)(void *ctx, int64_t begin, int64_t end);
+    void *ctx;
+    const uz_csc *A;
+    int64_t first[COLUMN_PARTS]; /* of a part, column that has rows beyond it */
+} column_loop;
+
+static int64_t begin_of(const column_loop *l, int part)
+{
+    return l->A->cols * part / COLUMN_PARTS;
+}
+
+/* From `begin` on runs the columns that have rows from `border` on, or those that have none; returns the first of the
+ * others. */
+static int64_t run_columns(const column_loop *l, int64_t begin, int64_t end, int64_t border, bool beyond)
+{
+    const int64_t *ptr = l->A->ptr, *idx = l->A->idx;
+    int64_t from = begin, other = end;
+    for (int64_t j = begin; j < end; j++) {
+        if ((ptr[j + 1] > ptr[j] && idx[ptr[j + 1] - 1] >= border) == beyond)
+            continue;
+        if (j > from)
+            l->run(l->ctx, from, j);
+        from = j + 1;
+        other = j < other ? j : other;
+    }
+    if (end > from)
+        l->run(l->ctx, from, end);
+    return other;
+}
+
+static void run_column_part(void *ctx, int part)
+{
+    column_loop *l = ctx;
+    const int64_t end = begin_of(l, part + 1);
+    l->first[part] = end;
+    for (int64_t j = begin_of(l, part); j < end; j += COLUMNS_AT_ONCE) {
+        const int64_t stop = end - j < COLUMNS_AT_ONCE ? end : j + COLUMNS_AT_ONCE,
+                      beyond = run_columns(l, j, stop, end, false);
+        l->first[part] = beyond < stop && beyond < l->first[part] ? beyond : l->first[part];
+    }
+}
+
+void uz_by_columns(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, const uz_csc *A)
+{
+    column_loop l = {.run = run, .ctx = ctx, .A = A};
+    if (A->cols < COLUMNS_LEAST) {
+        run(ctx, 0, A->cols);
+        return;
+    }
+    uz_aside_share(run_column_part, &l, COLUMN_PARTS);
+    for (int part = 0; part < COLUMN_PARTS; part++) {
+        const int64_t end = begin_of(&l, part + 1);
+        (void)run_columns(&l, l.first[part], end, end, true);
+    }
+}
+
+/* ----------------------------------------------------------------------- sums */
+
 /* What a piece of two vectors has. */
 typedef double (*of_piece)(int64_t n, const void *x, const void *y);
 

@@ -4,10 +4,15 @@
 #ifndef UZ_LINALG_PIECES_H
 #define UZ_LINALG_PIECES_H
 
+#include "uzawa.h"
+
 #include <stdint.h>
 
 /* run(ctx, begin, end) for ranges that make up 0..n; of a short vector for all of it. */
 void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n);
+/* run(ctx, begin, end) for ranges that make up the columns of a lower triangle, rows ascending in each: what runs at
+ * once has no row in common, and in which order a row meets its columns the matrix alone decides. */
+void uz_by_columns(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, const uz_csc *A);
 /* x'y. */
 double uz_long_dot(int64_t n, const double *x, const double *y);
 /* The same of single numbers, their products and sums in double precision. */
