@@ -5,6 +5,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "law/sign.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
@@ -124,17 +125,21 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
  * times its diagonal. */
 #define ROW_SUM 4.0
 
+static void subtract_load(void *ctx, int64_t begin, int64_t end)
+{
+    const uz_bounded *box = ctx;
+    for (int64_t j = begin; j < end; j++)
+        box->force[j] -= box->p[j];
+}
+
 /* Where K has its diagonal only, or roughly does: the force by its product, and for size what a row of a mesh of equal
  * cells may add up to with the largest displacement that there is. */
 static void balance_by_product(const uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
     uz_sparse_multiply(&x->load, box->force, box->u);
-    box->largest = 0.0;
-    for (int64_t j = 0; j < x->load.K->cols; j++) {
-        box->largest = fabs(box->u[j]) > box->largest ? fabs(box->u[j]) : box->largest;
-        box->force[j] -= box->p[j];
-    }
+    box->largest = uz_long_max(x->load.K->cols, box->u);
+    uz_by_pieces(subtract_load, box, x->load.K->cols);
 }
 
 static double size_of(const uz_bounded *box, const uz_csc *K, int64_t j)
@@ -153,18 +158,37 @@ static bool has_doubts(const uz_bounded *box)
     return doubts;
 }
 
-/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to; roughly: by an estimate of it,
- * which also has to do where a product alone is faster and shows no row that pulls. */
-void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
+/* What columns add to the sizes of held dofs. */
+static void add_sizes(void *ctx, int64_t begin, int64_t end)
+{
+    const uz_sparse_load *x = ctx;
+    const uz_csc *K = x->load.K;
+    const bool *held = x->box->fixed;
+    const double *u = x->box->u;
+    double *size = x->box->size;
+    for (int64_t j = begin; j < end; j++) {
+        for (int64_t k = K->ptr[j]; held[j] && k < K->ptr[j + 1]; k++)
+            size[j] += fabs(K->val[k] * u[K->idx[k]]);
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            if (held[K->idx[k]] && K->idx[k] != j)
+                size[K->idx[k]] += fabs(K->val[k] * u[j]);
+    }
+}
+
+/* size = |K| |u| + |p| of held dofs, which alone are asked for it. */
+static void find_sizes(const uz_sparse_load *x)
+{
+    const uz_bounded *box = x->box;
+    for (int64_t b = 0; b < box->n; b++)
+        box->size[box->dof[b]] = fabs(box->p[box->dof[b]]);
+    uz_by_columns(add_sizes, (void *)(uintptr_t)x, x->load.K);
+}
+
+/* force, and size of all dofs. */
+static void balance_by_entries(const uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
     const uz_csc *K = x->load.K;
-    const bool entries = uz_sparse_has_entries(x->load.dual);
-    if (roughly || x->room || !entries)
-        balance_by_product(x);
-    if (roughly || !entries || (x->room && !has_doubts(box)))
-        return;
-    box->largest = -1.0;
     for (int64_t j = 0; j < K->cols; j++) {
         box->force[j] = -box->p[j];
         box->size[j] = fabs(box->p[j]);
@@ -183,6 +207,23 @@ void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
         box->force[j] = force;
         box->size[j] = size;
     }
+}
+
+/* force = K u - p, and size of held dofs, what its rounding is in proportion to; roughly: by an estimate of it, which
+ * also has to do where a product alone is faster and shows no row that pulls. */
+void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
+{
+    uz_bounded *box = x->box;
+    const bool entries = uz_sparse_has_entries(x->load.dual);
+    if (roughly || x->room || !entries)
+        balance_by_product(x);
+    if (roughly || !entries || (x->room && !has_doubts(box)))
+        return;
+    box->largest = -1.0;
+    if (x->room)
+        find_sizes(x);
+    else
+        balance_by_entries(x);
 }
 
 /* Signs below this, relative to the terms of a sum, are rounding: weakly active rows must not make the steps chatter.

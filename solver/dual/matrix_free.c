@@ -21,6 +21,7 @@
 #include "core/error.h"
 #include "law/sign.h"
 #include "linalg/blas.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
@@ -446,17 +447,27 @@ static double goal_of(const free_load *x, double tolerance, double square)
            sqrt(x->sparse.load.dual->amg->info.lambda);
 }
 
+/* What is missing of equilibrium in cg->r is what is left over in force. */
+typedef struct {
+    double *to;
+    const double *from;
+} opposite;
+
+static void negate(void *ctx, int64_t begin, int64_t end)
+{
+    const opposite *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->to[j] = -x->from[j];
+}
+
 /* As uz_cg_stop has it, with p - K u in cg->r: a guess that looks right is solved for, another one is not. */
 static double look(void *ctx)
 {
     const stepwise *s = ctx;
     free_load *x = s->x;
     uz_bounded *box = x->sparse.box;
-    box->largest = 0.0;
-    for (int64_t j = 0; j < x->cg.n; j++) {
-        box->largest = fmax(box->largest, fabs(box->u[j]));
-        box->force[j] = -x->cg.r[j];
-    }
+    box->largest = uz_long_max(x->cg.n, box->u);
+    uz_by_pieces(negate, &(opposite){box->force, x->cg.r}, x->cg.n);
     if (!looks_right(s))
         return INFINITY;
     return goal_of(x, s->least, uz_dot(x->cg.n, box->u, box->force) + uz_dot(x->cg.n, box->u, box->p));
@@ -498,8 +509,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
             stop.unchecked = least >= NO_DRIFT;
         }
         stop.begun = true;
-        for (int64_t j = 0; j < d; j++)
-            cg->r[j] = -box->force[j];
+        uz_by_pieces(negate, &(opposite){cg->r, box->force}, d);
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
