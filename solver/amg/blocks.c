@@ -69,23 +69,35 @@ void uz_below_clear(uz_below *below)
 #define PART_LEAST 8192
 #define MOST_REST  0.2
 
-/* The part of each group, by its number in the order of first dofs, `nodes` of them: ranges of that, and the rest
- * (`parts`), which has whoever has a neighbour in an earlier range. Returns how many are of the rest. */
-static int64_t find_parts(int8_t *part, int parts, const int32_t *number, int64_t nodes, const uz_csc *K,
-                          const uz_modes *modes)
+/* K as the threads that look for parts see it: of groups, what number they have in the order of first dofs, and their
+ * parts, which are ranges of that; whoever has a neighbour in an earlier range is of the rest. */
+typedef struct {
+    const uz_csc *K;
+    const int32_t *node;   /* the group of each dof */
+    const int32_t *number; /* -1: none */
+    const int8_t *part;
+    bool *rest;
+    int pieces;
+    int32_t reach[UZ_ASIDE_MOST]; /* how far apart neighbours are in the order, at most */
+} division;
+
+static void find_rest(void *ctx, int piece)
 {
-    int64_t rest = 0;
-    for (int64_t g = 0; g < modes->n_nodes; g++)
-        part[g] = (int8_t)(number[g] < 0 ? 0 : number[g] * (int64_t)parts / nodes);
-    for (int64_t j = 0; j < K->cols; j++)
+    division *x = ctx;
+    const uz_csc *K = x->K;
+    const int64_t end = K->cols * (piece + 1) / x->pieces;
+    int32_t reach = 0;
+    for (int64_t j = K->cols * piece / x->pieces; j < end; j++) {
+        const int32_t J = x->node[j], at = x->number[J];
+        const int8_t part = x->part[J];
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++) {
-            const int32_t I = modes->node[K->idx[q]], J = modes->node[j], later = number[I] > number[J] ? I : J;
-            if (part[I] == part[J] || part[I] == parts || part[J] == parts)
-                continue;
-            part[later] = (int8_t)parts;
-            rest++;
+            const int32_t I = x->node[K->idx[q]], apart = abs(x->number[I] - at);
+            reach = apart > reach ? apart : reach;
+            if (x->part[I] != part) /* others may find the same */
+                __atomic_store_n(x->rest + (x->part[I] > part ? I : J), true, __ATOMIC_RELAXED);
         }
-    return rest;
+    }
+    x->reach[piece] = reach;
 }
 
 /* Numbers the nodes by parts, where there are enough of them. false: no memory. */
@@ -96,22 +108,36 @@ static bool number_by_parts(uz_blocks *A, int32_t *node_of_group, const uz_csc *
     if (parts < 2)
         return true;
     int8_t *part = uz_alloc(modes->n_nodes, sizeof *part);
-    int32_t *group = uz_alloc(nodes, sizeof *group); /* by number */
-    const bool ok = part && group;
-    if (ok && (double)find_parts(part, parts, node_of_group, nodes, K, modes) <= MOST_REST * (double)nodes) {
-        for (int64_t g = 0; g < modes->n_nodes; g++)
+    bool *rest = uz_alloc_zero(modes->n_nodes, sizeof *rest);
+    int32_t *group = uz_alloc(nodes, sizeof *group), reach = 0; /* by number */
+    const bool ok = part && group && rest;
+    if (ok) {
+        division x = {K, modes->node, node_of_group, part, rest, uz_aside_threads(), {0}};
+        int64_t left = 0;
+        for (int64_t g = 0; g < modes->n_nodes; g++) {
+            part[g] = (int8_t)(node_of_group[g] < 0 ? 0 : node_of_group[g] * (int64_t)parts / nodes);
             if (node_of_group[g] >= 0)
                 group[node_of_group[g]] = (int32_t)g;
-        int32_t next = 0;
-        A->parts = parts;
-        for (int p = 0; p <= parts; p++) {
-            A->part[p] = next;
-            for (int64_t i = 0; i < nodes; i++)
-                if (part[group[i]] == p)
-                    node_of_group[group[i]] = next++;
         }
+        uz_aside_share(find_rest, &x, x.pieces);
+        for (int piece = 0; piece < x.pieces; piece++)
+            reach = x.reach[piece] > reach ? x.reach[piece] : reach;
+        for (int64_t g = 0; g < modes->n_nodes; g++)
+            left += rest[g];
+        A->parts = (double)left <= MOST_REST * (double)nodes ? parts : 0;
     }
+    int32_t next = 0;
+    for (int p = 0; ok && A->parts > 0 && p < 2 * parts; p++) {
+        *(p < parts ? A->part + p : A->seam + p - parts) = next;
+        for (int64_t i = 0; i < nodes; i++)
+            if (part[group[i]] == p % parts && rest[group[i]] == (p >= parts))
+                node_of_group[group[i]] = next++;
+    }
+    A->part[parts] = A->seam[0];
+    A->seam[parts] = nodes;
+    A->seams = A->parts > 0 && nodes / parts >= 3 * (int64_t)reach ? parts : 0;
     free(part);
+    free(rest);
     free(group);
     return ok;
 }
@@ -458,13 +484,22 @@ static void multiply_part(void *ctx, int part)
     p->multiply(p, p->A->part[part], p->A->part[part + 1]);
 }
 
+static void multiply_seam(void *ctx, int seam)
+{
+    const product *p = ctx;
+    p->multiply(p, p->A->seam[seam], p->A->seam[seam + 1]);
+}
+
 static void multiply_all(product *p)
 {
     const uz_blocks *A = p->A;
     p->multiply = uz_cpu_has_avx2_fma() ? multiply_fused : multiply_plain;
     if (A->parts > 0)
         uz_aside_share(multiply_part, p, A->parts);
-    p->multiply(p, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
+    if (A->seams > 0)
+        uz_aside_share(multiply_seam, p, A->seams);
+    else
+        p->multiply(p, A->parts > 0 ? A->part[A->parts] : 0, A->nodes);
 }
 
 void uz_blocks_multiply(double *y, const uz_blocks *A, const double *x, int lanes)

@@ -292,6 +292,23 @@ static void take_matrix_part(void *ctx, int part)
     x->take(x->step, x->what, (range){first[0], first[1]});
 }
 
+static void take_seam(void *ctx, int seam)
+{
+    const sharing *x = ctx;
+    const int64_t *first = x->step->level->A.seam + seam;
+    x->take(x->step, x->what, (range){first[0], first[1]});
+}
+
+/* What is in no part. */
+static void take_rest(sharing *x)
+{
+    const uz_blocks *A = &x->step->level->A;
+    if (A->seams > 0)
+        uz_aside_share(take_seam, x, A->seams);
+    else
+        x->take(x->step, x->what, (range){A->parts > 0 ? A->part[A->parts] : 0, A->nodes});
+}
+
 static void take_range(void *ctx, int part)
 {
     const sharing *x = ctx;
@@ -303,17 +320,16 @@ static void take_range(void *ctx, int part)
 static void take_step(sharing *x, int what)
 {
     const uz_blocks *A = &x->step->level->A;
-    const range rest = {A->parts > 0 ? A->part[A->parts] : 0, A->nodes};
     x->what = what;
     x->ranges = A->parts > 0 ? uz_aside_threads() : 1;
     if (what == UZ_STEP_SWEEP_UP)
-        x->take(x->step, what, rest);
+        take_rest(x);
     if (what == UZ_STEP_RESTRICT || what == UZ_STEP_PROLONG)
         uz_aside_share(take_range, x, x->ranges);
     else if (A->parts > 0)
         uz_aside_share(take_matrix_part, x, A->parts);
     if (what == UZ_STEP_SWEEP_DOWN || what == UZ_STEP_REDUCE || what == UZ_STEP_RAISE)
-        x->take(x->step, what, rest);
+        take_rest(x);
 }
 
 void uz_level_take_step(const uz_level_step *s, int parts)

@@ -17,9 +17,12 @@ typedef struct {
     int32_t *idx;       /* ptr[nodes]: the columns left of the diagonal, ascending */
     double *off, *diag; /* ptr[nodes] x b x b, nodes x b x b */
     /* Nodes from part[p] to part[p + 1] have blocks left of the diagonal among themselves alone; those after all parts
-     * anywhere. What goes through the rows in order can take the parts at once. parts 0: not known. */
-    int parts;
-    int64_t part[UZ_PARTS_MOST + 1];
+     * anywhere. What goes through the rows in order can take the parts at once. parts 0: not known.
+     * seams > 0: of those after all parts, whose begin is seam[0], nodes from seam[s] to seam[s + 1] and those that
+     * they have blocks with have none in common with others of these; together they are all: they can be taken at once,
+     * too. */
+    int parts, seams;
+    int64_t part[UZ_PARTS_MOST + 1], seam[UZ_PARTS_MOST + 1];
 } uz_blocks;
 void uz_blocks_clear(uz_blocks *A);
 /* Where in A->idx the column is, which must be there. */
