@@ -130,7 +130,8 @@ typedef struct {
     uz_blocks *loss;
     const uz_level *fine;
     const float *inverse;
-    const bool *any; /* nodes: has it held dofs? */
+    const uz_blocks *from; /* loss of the finer level that it is P'(that) P of; NULL: it comes of held dofs */
+    bool *any;             /* nodes: has it held dofs, or lost something itself? */
     int32_t first[UZ_ASIDE_MOST + 1];
 } losing;
 
@@ -188,18 +189,25 @@ static bool share_out(losing *x, int parts)
 /* Nodes of a part, at least. */
 enum { PART_LEAST = 4096 };
 
+/* Whatever `any` says, lost by threads. false: no memory. */
+static bool lose_by_parts(losing *x, void (*run)(void *ctx, int part))
+{
+    const int64_t most = x->fine->A.nodes / PART_LEAST;
+    const int threads = most < 2 ? 1 : uz_aside_threads(), parts = threads < most || most < 2 ? threads : (int)most;
+    const bool ok = share_out(x, parts);
+    if (ok)
+        uz_aside_share(run, x, parts);
+    return ok;
+}
+
 bool uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
 {
-    const int64_t nodes = fine->A.nodes, most = nodes / PART_LEAST;
-    const int threads = most < 2 ? 1 : uz_aside_threads(), parts = threads < most || most < 2 ? threads : (int)most;
-    bool *any = uz_alloc(nodes, sizeof *any);
-    losing x = {loss, fine, inverse, any, {0}};
-    for (int64_t i = 0; any && i < nodes; i++)
-        any[i] = is_any_held(inverse + i * fine->A.b, fine->inverse + i * fine->A.b, fine->A.b);
-    const bool ok = any && share_out(&x, parts);
-    if (ok)
-        uz_aside_share(lose_part, &x, parts);
-    free(any);
+    const int64_t nodes = fine->A.nodes;
+    losing x = {.loss = loss, .fine = fine, .inverse = inverse, .any = uz_alloc(nodes, sizeof *x.any)};
+    for (int64_t i = 0; x.any && i < nodes; i++)
+        x.any[i] = is_any_held(inverse + i * fine->A.b, fine->inverse + i * fine->A.b, fine->A.b);
+    const bool ok = x.any && lose_by_parts(&x, lose_part);
+    free(x.any);
     return ok;
 }
 
@@ -211,21 +219,46 @@ static bool is_zero(const double *block, int64_t size)
     return k == size;
 }
 
-/* What the next level loses: P'(loss) P. */
-static void pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level, const uz_team *team)
+static void look_for_losses(void *ctx, int64_t begin, int64_t end)
+{
+    const losing *x = ctx;
+    const uz_blocks *from = x->from;
+    const int64_t size = (int64_t)from->b * from->b;
+    for (int64_t i = begin; i < end; i++)
+        x->any[i] = !is_zero(from->diag + i * size, size) ||
+                    !is_zero(from->off + from->ptr[i] * size, (from->ptr[i + 1] - from->ptr[i]) * size);
+}
+
+static void pass_part(void *ctx, int part)
 {
     static const double all[SIZE_MOST] = {1, 1, 1, 1, 1, 1}, half[SIZE_MOST] = {.5, .5, .5, .5, .5, .5};
-    const int64_t size = (int64_t)loss->b * loss->b;
-    const int32_t rows = (int32_t)next->nodes;
-    const int64_t end = uz_team_first(team, 1, loss->nodes);
-    for (int64_t i = uz_team_first(team, 0, loss->nodes); i < end; i++) {
-        if (!is_zero(loss->diag + i * size, size))
-            add_coupling(next, level, &(coupling){loss->diag + i * size, false, i, i, all, half, 0, rows});
-        for (int64_t e = loss->ptr[i]; e < loss->ptr[i + 1]; e++)
-            if (!is_zero(loss->off + e * size, size))
-                add_coupling(next, level, &(coupling){loss->off + e * size, false, i, loss->idx[e], all, all, 0, rows});
+    const losing *x = ctx;
+    const uz_blocks *from = x->from;
+    const int64_t size = (int64_t)from->b * from->b;
+    const int32_t first = x->first[part], end = x->first[part + 1];
+    for (int64_t i = 0; i < from->nodes; i++) {
+        if (!x->any[i])
+            continue;
+        if (!is_zero(from->diag + i * size, size))
+            add_coupling(x->loss, x->fine, &(coupling){from->diag + i * size, false, i, i, all, half, first, end});
+        for (int64_t e = from->ptr[i]; e < from->ptr[i + 1]; e++)
+            if (!is_zero(from->off + e * size, size))
+                add_coupling(x->loss, x->fine,
+                             &(coupling){from->off + e * size, false, i, from->idx[e], all, all, first, end});
     }
+}
+
+/* What the next level loses: P'(loss) P. false: no memory. */
+static bool pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level, const uz_team *team)
+{
+    const int64_t begin = uz_team_first(team, 0, loss->nodes), end = uz_team_first(team, 1, loss->nodes);
+    losing x = {.loss = next, .fine = level, .from = loss, .any = uz_alloc_zero(loss->nodes, sizeof *x.any)};
+    if (x.any)
+        look_for_losses(&x, begin, end);
+    const bool ok = x.any && lose_by_parts(&x, pass_part);
+    free(x.any);
     uz_team_sum(team, next);
+    return ok;
 }
 
 typedef struct {
@@ -288,13 +321,23 @@ static uz_status factor(uz_multigrid_room *room, const uz_level *last, const uz_
     return status;
 }
 
+static void clear_numbers(void *ctx, int64_t begin, int64_t end)
+{
+    memset((double *)ctx + begin, 0, (size_t)(end - begin) * sizeof(double));
+}
+
 static bool init_loss(uz_blocks *loss, const uz_level *level)
 {
     const int64_t size = (int64_t)level->A.b * level->A.b;
     *loss = level->A; /* whose places it shares */
-    loss->off = uz_alloc_zero(level->A.ptr[level->A.nodes] * size, sizeof *loss->off);
-    loss->diag = uz_alloc_zero(level->A.nodes * size, sizeof *loss->diag);
-    return loss->off && loss->diag;
+    const int64_t off = level->A.ptr[level->A.nodes] * size, diag = level->A.nodes * size;
+    loss->off = uz_alloc(off, sizeof *loss->off);
+    loss->diag = uz_alloc(diag, sizeof *loss->diag);
+    if (!loss->off || !loss->diag)
+        return false;
+    uz_by_pieces(clear_numbers, loss->off, off);
+    uz_by_pieces(clear_numbers, loss->diag, diag);
+    return true;
 }
 
 void uz_release_levels(uz_multigrid_room *room)
@@ -320,8 +363,8 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
             status = fail_memory(mg->base.n, err);
         else if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
-        else if (l > from)
-            pass_on(&next, loss, &mg->level[l - 1], team);
+        else if (l > from && !pass_on(&next, loss, &mg->level[l - 1], team))
+            status = fail_memory(mg->base.n, err);
         if (l > from) {
             free(loss->off);
             free(loss->diag);
