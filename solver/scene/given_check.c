@@ -2,8 +2,10 @@
 #include "scene/given.h"
 
 #include "core/error.h"
+#include "linalg/pieces.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 
 uz_status uz_given_refuse(const uz_given_mesh *given, int64_t element, const char *what, const char *remedy,
@@ -132,6 +134,33 @@ static uz_status check_shape(const uz_given_mesh *given, int64_t e, uz_error *er
     return uz_given_refuse(given, e, what, "its nodes are in a wrong order, or it must be split", err);
 }
 
+/* Elements as the threads that check them see them. */
+typedef struct {
+    const uz_given_mesh *given;
+    atomic_int_fast64_t first; /* that is none, so far */
+} checking;
+
+static uz_status check(const uz_given_mesh *given, int64_t e, uz_error *err)
+{
+    const uz_status status = check_element(given, e, err);
+    return status == UZ_OK ? check_shape(given, e, err) : status;
+}
+
+static void look_for_first(void *ctx, int64_t begin, int64_t end)
+{
+    checking *x = ctx;
+    for (int64_t e = begin; e < end; e++) {
+        int_fast64_t first = atomic_load_explicit(&x->first, memory_order_relaxed);
+        if (e >= first)
+            return;
+        if (check(x->given, e, NULL) == UZ_OK)
+            continue;
+        while (e < first && !atomic_compare_exchange_weak(&x->first, &first, e))
+            ;
+        return;
+    }
+}
+
 uz_status uz_given_check(const uz_given_mesh *given, int dim, uz_error *err)
 {
     char where[UZ_POINTER];
@@ -150,11 +179,7 @@ uz_status uz_given_check(const uz_given_mesh *given, int dim, uz_error *err)
             return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? given->from_file : where,
                            "a coordinate of node %lld is not a finite number", (long long)(i / dim));
         }
-    uz_status status = UZ_OK;
-    for (int64_t e = 0; e < given->n_elements && status == UZ_OK; e++) {
-        status = check_element(given, e, err);
-        if (status == UZ_OK)
-            status = check_shape(given, e, err);
-    }
-    return status;
+    checking x = {.given = given, .first = given->n_elements};
+    uz_by_pieces(look_for_first, &x, given->n_elements);
+    return x.first < given->n_elements ? check(given, x.first, err) : UZ_OK;
 }

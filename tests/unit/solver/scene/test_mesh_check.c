@@ -1,4 +1,5 @@
 /* What a scene on a mesh with groups is refused for: materials, supports, loads, contacts, model. */
+#include "core/aside.h"
 #include "harness.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
@@ -190,4 +191,47 @@ TEST(contacts_suit_their_groups)
     TAKEN(contact(&s, UZ_OBSTACLE_BODY, "bottom", "bottom"));
     REFUSED(contact(&s, UZ_OBSTACLE_BODY, "bottom", "lower"), "/contacts/0/with", "made of elements");
     REFUSED(contact(&s, UZ_OBSTACLE_BODY, "bottom", "ground"), "/contacts/0/with", "no group");
+}
+
+/* A strip of triangles, two of which are inverted: the first one is told of, whoever finds which first. */
+TEST(threads_find_the_first_element_that_is_wrong)
+{
+    enum { N = 40000, FIRST = 20003, SECOND = 39001, THREADS = 3 };
+    uz_given_mesh given = {.dim = 2, .n_nodes = N + 2, .n_elements = N};
+    double *xyz = malloc((N + 2) * 2 * sizeof *xyz);
+    unsigned char *kind = malloc(N);
+    int64_t *first = malloc((N + 1) * sizeof *first), *node = malloc((size_t)N * 3 * sizeof *node);
+    CHECK(xyz && kind && first && node);
+    for (int i = 0; i < N + 2; i++) {
+        const int column = i / 2;
+        xyz[2 * i] = column;
+        xyz[2 * i + 1] = i % 2;
+    }
+    for (int e = 0; e <= N; e++)
+        first[e] = 3 * e;
+    for (int e = 0; e < N; e++) {
+        const bool turned = (e % 2 == 0) == (e == FIRST || e == SECOND);
+        kind[e] = UZ_TRI3;
+        node[3 * e] = e;
+        node[3 * e + 1] = turned ? e + 1 : e + 2;
+        node[3 * e + 2] = turned ? e + 2 : e + 1;
+    }
+    given.xyz = xyz;
+    given.kind = kind;
+    given.first = first;
+    given.node = node;
+    const uz_scene scene = {.model = UZ_PLANE_STRESS, .thickness = 1, .source = UZ_MESH_GIVEN, .given = given};
+    CHECK_INT(uz_aside_begin(THREADS), THREADS);
+    for (int threads = 1; threads <= THREADS; threads++) {
+        uz_mesh mesh;
+        uz_error err = {0};
+        uz_aside_allow(threads);
+        CHECK_INT(uz_mesh_from_scene(&mesh, &scene, &err), UZ_ERR_SCENE);
+        CHECK_MSG(strstr(err.message, "element 20003 "), "%s", err.message);
+    }
+    uz_aside_allow(1);
+    free(xyz);
+    free(kind);
+    free(first);
+    free(node);
 }
