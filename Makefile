@@ -197,7 +197,7 @@ $(BUILD)/obj/%.o: %.c
 CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c solver/finite/finite_element.c $(wildcard solver/brick/*.c)
 $(call obj,$(CONTRACTED)): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
-UNROLLED := solver/amg/blocks.c solver/amg/cg.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/amg/prolong.c solver/amg/rough.c solver/certificate/finite.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/finite/*.c solver/post/*.c) solver/io/vtu.c
+UNROLLED := solver/amg/blocks.c solver/amg/cg.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/amg/multigrid.c solver/amg/prolong.c solver/amg/rough.c solver/certificate/finite.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/finite/*.c solver/post/*.c) solver/io/vtu.c
 # Where elements are, not with a sanitizer: its checks in every copy take a minute to compile, and tests gain less. Nor
 # where a multigrid has a copy for each size of its blocks.
 ROLLED = $(if $(SAN),$(addprefix $(BUILD)/obj/solver/,amg/blocks.o amg/cycle.o amg/galerkin.o element/% finite/% post/% assembly/stress_lanes.o))

@@ -69,31 +69,52 @@ uz_status uz_level_round(uz_level *level, uz_error *err)
     return UZ_OK;
 }
 
-/* y = A x, vectors with `width` numbers for each node, the surplus ones 0: four where uz_blocks_multiply takes them. */
+/* y = A x, b numbers for each node, of the rounded numbers. */
+static inline __attribute__((always_inline)) void multiply_rounded(double *y, const uz_level *level, const double *x,
+                                                                   int b)
+{
+    const uz_blocks *A = &level->A;
+    for (int64_t i = 0; i < A->nodes; i++) {
+        const double *mine = x + i * b;
+        double sum[UZ_MODES_MOST] = {0.0};
+        for (int r = 0; r < b; r++)
+            for (int c = 0; c < b; c++)
+                sum[r] += (double)level->diag[(i * b + r) * b + c] * mine[c];
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+            const double *other = x + (int64_t)A->idx[e] * b;
+            double *to = y + (int64_t)A->idx[e] * b, back[UZ_MODES_MOST] = {0.0};
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < b; c++) {
+                    const double value = (double)level->off[(e * b + r) * b + c];
+                    sum[r] += value * other[c];
+                    back[c] += value * mine[r];
+                }
+            for (int c = 0; c < b; c++)
+                to[c] += back[c];
+        }
+        for (int r = 0; r < b; r++)
+            y[i * b + r] = sum[r];
+    }
+}
+
+UZ_AVX2_FMA static void multiply_six_fused(double *y, const uz_level *level, const double *x)
+{
+    multiply_rounded(y, level, x, 6);
+}
+
+/* y = A x roughly, vectors with `width` numbers for each node, the surplus ones 0: four where uz_blocks_multiply takes
+ * them. */
 static void multiply(double *y, const uz_level *level, const double *x, int width)
 {
     const uz_blocks *A = &level->A;
-    const int b = A->b;
-    const int64_t size = (int64_t)b * b;
-    double room[UZ_MODES_MOST * UZ_MODES_MOST];
     if (width == 4 && A->off)
         uz_blocks_multiply(y, A, x, 1);
     else if (width == 4)
         uz_level_multiply_parts(y, level, x, 1);
-    if (width == 4)
-        return;
-    memset(y, 0, (size_t)(A->nodes * width) * sizeof *y);
-    for (int64_t i = 0; i < A->nodes; i++)
-        for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
-            const bool own = e < A->ptr[i];
-            const double *block = uz_level_block(room, level, own, own ? i : e, size);
-            const int64_t j = own ? i : A->idx[e];
-            for (int r = 0; r < b; r++)
-                for (int c = 0; c < b; c++) {
-                    y[i * width + r] += block[r * b + c] * x[j * width + c];
-                    y[j * width + c] += own ? 0.0 : block[r * b + c] * x[i * width + r];
-                }
-        }
+    else if (width == 6 && uz_cpu_has_avx2_fma())
+        multiply_six_fused(y, level, x);
+    else
+        multiply_rounded(y, level, x, width);
 }
 
 /* Vectors of `width` numbers for each node, of which the first b are dofs. */
@@ -133,7 +154,7 @@ uz_status uz_level_range(double *range, const uz_level *level, uz_error *err)
         multiply(y, level, x, width);
         power p = {x, y, level->inverse, b, width, 1.0};
         uz_by_pieces(precondition, &p, A->nodes);
-        const double before = uz_norm(n, x), after = uz_norm(n, y);
+        const double before = sqrt(uz_long_dot(n, x, x)), after = sqrt(uz_long_dot(n, y, y));
         *range = before > 0.0 && after > 0.0 ? 1.1 * (after / before) : 1.0;
         if (!(before > 0.0) || !(after > 0.0))
             break;
