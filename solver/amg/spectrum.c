@@ -66,11 +66,20 @@ static double excluded(const coefficients *c, double level)
     return exp(low);
 }
 
-static void random_residual(uz_cg *cg, const uz_csc *K)
+/* Vectors of dofs beside the diagonal of K, in pieces that threads share. */
+typedef struct {
+    const uz_csc *K;
+    double *to;
+    const double *from;
+    double norm;
+} by_diagonal;
+
+static void draw_residual(void *ctx, int64_t begin, int64_t end)
 {
-    uint64_t state = 0x9E3779B97F4A7C15u;
-    for (int64_t j = 0; j < cg->n; j++)
-        cg->r[j] = sqrt(K->val[K->ptr[j]]) * uz_normal(&state);
+    const by_diagonal *x = ctx;
+    uint64_t state = uz_random_after(0x9E3779B97F4A7C15u, 2 * (uint64_t)begin);
+    for (int64_t j = begin; j < end; j++)
+        x->to[j] = sqrt(x->K->val[x->K->ptr[j]]) * uz_normal(&state);
 }
 
 /* The bound is sharp enough where it is this share of the least Ritz value, as the least eigenvalue is no larger than
@@ -83,16 +92,28 @@ static void random_residual(uz_cg *cg, const uz_csc *K)
 /* M is K but for rounding where there is one level only, and steps are cheap. */
 #define NEAR_ONE 0.9
 
+static void multiply_by_diagonal(void *ctx, int64_t begin, int64_t end)
+{
+    const by_diagonal *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->to[j] = x->K->val[x->K->ptr[j]] * x->from[j];
+}
+
+static void divide_by_norm(void *ctx, int64_t begin, int64_t end)
+{
+    const by_diagonal *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->to[j] /= x->norm;
+}
+
 /* power = D z / ||D^1/2 z||, D = diag(K). Returns that norm. */
 static double begin_power(double *power, const double *z, const uz_csc *K)
 {
-    double square = 0.0;
-    for (int64_t j = 0; j < K->cols; j++)
-        square += K->val[K->ptr[j]] * z[j] * z[j];
-    const double norm = sqrt(square);
-    for (int64_t j = 0; j < K->cols; j++)
-        power[j] = K->val[K->ptr[j]] * z[j] / norm;
-    return norm;
+    by_diagonal x = {.K = K, .to = power, .from = z};
+    uz_by_pieces(multiply_by_diagonal, &x, K->cols);
+    x.norm = sqrt(uz_long_dot(K->cols, power, z));
+    uz_by_pieces(divide_by_norm, &x, K->cols);
+    return x.norm;
 }
 
 /* Will so many steps not do? A residual that has fallen by `fallen` has to fall by `needed`, logarithms both. In the
@@ -260,7 +281,7 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
     if (status == UZ_OK) {
         amg->info.levels = mg->levels;
         amg->info.bytes = mg->bytes;
-        random_residual(&cg, K);
+        uz_by_pieces(draw_residual, &(by_diagonal){.K = K, .to = cg.r}, cg.n);
         status = find_most(&most, power, &cg, K, err);
     }
     if (status == UZ_OK)

@@ -12,7 +12,20 @@ static inline double uz_uniform(uint64_t *state)
     return ((double)(*state >> 11) + 0.5) * 0x1p-53;
 }
 
-/* Standard normal: Box and Muller 1958. */
+/* The state after so many more numbers, by the squares of what leads to the next one (F. Brown, Trans. Am. Nucl. Soc.
+ * 71 (1994)). */
+static inline uint64_t uz_random_after(uint64_t state, uint64_t numbers)
+{
+    uint64_t factor = 6364136223846793005u, term = 1442695040888963407u;
+    for (; numbers > 0; numbers >>= 1) {
+        state = numbers & 1 ? state * factor + term : state;
+        term *= factor + 1;
+        factor *= factor;
+    }
+    return state;
+}
+
+/* Standard normal, of two numbers: Box and Muller 1958. */
 static inline double uz_normal(uint64_t *state)
 {
     double radius = sqrt(-2.0 * log(uz_uniform(state)));
