@@ -122,20 +122,38 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
 
 /* ----------------------------------------------------------- what is held */
 
-/* inverse of the first grid: 0 at supported dofs, those of `held` (d, NULL: none), and in the padding. */
-static void first_inverse(float *inverse, const uz_brick_grids *mg, const bool *held)
+/* The first grid as the threads that hold its dofs see it. */
+typedef struct {
+    float *inverse;
+    const uz_brick_grids *mg;
+    const bool *held;
+    int slabs;
+} holding;
+
+static void hold_slab(void *ctx, int slab)
 {
-    const uz_brick_level *level = &mg->level[0];
-    const int64_t *dof = mg->brick->dof, *n = level->cells;
-    for (int64_t k = 0; k <= n[2]; k++)
+    const holding *x = ctx;
+    const uz_brick_level *level = &x->mg->level[0];
+    const int64_t *n = level->cells, first = uz_brick_slab(n[2] + 1, slab, x->slabs),
+                  end = uz_brick_slab(n[2] + 1, slab + 1, x->slabs);
+    const int64_t *dof = x->mg->brick->dof + 3 * (n[0] + 1) * (n[1] + 1) * first;
+    for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++)
             for (int64_t i = 0; i <= n[0]; i++, dof += 3) {
                 const int cells =
                     (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
                 for (int c = 0; c < 3; c++)
-                    inverse[c * level->size + k * level->plane + j * level->stride + i] =
-                        dof[c] < 0 || (held && held[dof[c]]) ? 0.0F : 1.0F / ((float)cells * level->diagonal[c]);
+                    x->inverse[c * level->size + k * level->plane + j * level->stride + i] =
+                        dof[c] < 0 || (x->held && x->held[dof[c]]) ? 0.0F : 1.0F / ((float)cells * level->diagonal[c]);
             }
+}
+
+/* inverse of the first grid: 0 at supported dofs, those of `held` (d, NULL: none), and in the padding. */
+static void first_inverse(float *inverse, const uz_brick_grids *mg, const bool *held)
+{
+    const uz_brick_level *level = &mg->level[0];
+    holding x = {inverse, mg, held, uz_brick_slabs(level->cells[2] + 1, level->size, UZ_ASIDE_MOST)};
+    uz_aside_share(hold_slab, &x, x.slabs);
 }
 
 /* A node of a coarser grid is held where the node of the finer one that stands there, or nearest to it, is. */
