@@ -3,12 +3,14 @@
 #include "post/balance.h"
 
 #include "core/vector3.h"
+#include "linalg/pieces.h"
 #include "post/parts.h"
 #include "obstacle/obstacle.h"
 #include "scene/scene.h"
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -67,6 +69,32 @@ __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const
 
 /* ---- strain and rotation */
 
+/* Is there a slope whose square is more than this, as the threads that share the elements see it. */
+typedef struct {
+    const uz_mesh *mesh;
+    const double *u;
+    double square;
+    atomic_bool found;
+} steepness;
+
+static void look_for_steep(void *ctx, int64_t begin, int64_t end)
+{
+    steepness *s = ctx;
+    const uz_mesh *mesh = s->mesh;
+    const int dim = mesh->dim;
+    const double *x = mesh->xyz, *u = s->u;
+    bool found = false;
+    for (int64_t e = begin; e < end && !found; e++) {
+        const int64_t first = mesh->node[mesh->first[e]] * dim;
+        for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
+            const int64_t i = mesh->node[k] * dim;
+            found = found || uz_distance2(u + i, u + first, dim) > s->square * uz_distance2(x + i, x + first, dim);
+        }
+    }
+    if (found)
+        s->found = true;
+}
+
 /* Does u change by more than `slope` over some distance between an element's first node and the others? Every strain
  * and rotation shows in that, if not in full. Where all elements are equal boxes with nodes at their corners only the
  * range of u over the shortest edge may tell that it does not. */
@@ -74,8 +102,8 @@ static bool is_steep(const doubts *d, double slope)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const int dim = mesh->dim;
-    const double *x = mesh->xyz, *u = d->u;
-    double range2 = 0, shortest = INFINITY, largest = 0;
+    const double *u = d->u;
+    double range2 = 0, shortest = INFINITY;
     for (int c = 0; c < dim && mesh->uniform; c++) {
         double least = u[c], most = u[c];
         for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
@@ -87,16 +115,9 @@ static bool is_steep(const doubts *d, double slope)
     }
     if (mesh->uniform && sqrt(range2) / shortest < 0.99 * slope)
         return false;
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const int64_t first = mesh->node[mesh->first[e]] * dim;
-        for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
-            const int64_t i = mesh->node[k] * dim;
-            const double du = uz_distance2(u + i, u + first, dim), dx = uz_distance2(x + i, x + first, dim);
-            if (du > largest * dx)
-                largest = du / dx;
-        }
-    }
-    return sqrt(largest) > slope;
+    steepness of = {.mesh = mesh, .u = u, .square = slope * slope};
+    uz_by_pieces(look_for_steep, &of, mesh->n_elements);
+    return of.found;
 }
 
 /* The largest principal strain, in absolute value, and the rotation in an element's middle. */
