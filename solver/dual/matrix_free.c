@@ -107,7 +107,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     double *base = x->sparse.base;
     int64_t d = load->dual->d;
     uz_cg_info info;
-    double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_dot(d, x->sparse.p, base));
+    double root = sqrt(load->dual->amg->info.lambda), norm = uz_root(uz_long_dot(d, x->sparse.p, base));
     /* From 0 the first residual has the size of the solution. */
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : aim * root, aim * norm * root);
     stop.unchecked = aim >= NO_DRIFT;
@@ -117,7 +117,7 @@ static uz_status solve_base(free_load *x, double aim, uz_error *err)
     x->base_aim = aim;
     x->base_slack = info.last / root;
     x->sparse.slack = x->base_slack;
-    load->psi0 = -0.5 * uz_dot(d, x->sparse.p, base);
+    load->psi0 = -0.5 * uz_long_dot(d, x->sparse.p, base);
     memcpy(load->g0, load->h, (size_t)load->dual->m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, base);
     return UZ_OK;
@@ -416,7 +416,7 @@ static uz_status measure_slack(free_load *x, const double *e, const double *r, u
     if (pulls)
         return UZ_OK;
     const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.p, e, err);
-    x->sparse.slack = x->held_slack = uz_root(uz_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
+    x->sparse.slack = x->held_slack = uz_root(uz_long_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
     return status;
 }
 
@@ -470,7 +470,7 @@ static double look(void *ctx)
     uz_by_pieces(negate, &(opposite){box->force, x->cg.r}, x->cg.n);
     if (!looks_right(s))
         return INFINITY;
-    return goal_of(x, s->least, uz_dot(x->cg.n, box->u, box->force) + uz_dot(x->cg.n, box->u, box->p));
+    return goal_of(x, s->least, uz_long_dot(x->cg.n, box->u, box->force) + uz_long_dot(x->cg.n, box->u, box->p));
 }
 
 /* u, r, g and active: at the coarse tolerance of the energy norm, and, while the guess still looks right, at the one
@@ -488,7 +488,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     double tolerance = fmax(least, x->coarse), *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     uz_sparse_multiply(load, box->force, box->u);
-    double square = uz_dot(d, box->u, box->force); /* u'K u */
+    double square = uz_long_dot(d, box->u, box->force); /* u'K u */
     for (int64_t j = 0; j < d; j++)
         box->force[j] -= x->sparse.p[j];
     for (bool go_on = true; status == UZ_OK && go_on;) {
@@ -515,7 +515,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
             break;
         const bool roughly = tolerance > least && (!stop.look || info.ended);
         uz_bounded_balance(&x->sparse, roughly);
-        square = uz_dot(d, box->u, box->force) + uz_dot(d, box->u, box->p);
+        square = uz_long_dot(d, box->u, box->force) + uz_long_dot(d, box->u, box->p);
         go_on = looks_right(&on_way) && roughly && (info.met || info.ended);
         tolerance = least;
     }
@@ -534,7 +534,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = measure_slack(x, e, box->r, err);
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
-        load->psi0 = 0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_dot(d, box->u, x->sparse.p));
+        load->psi0 =
+            0.5 * (uz_dot(m, box->r, load->h) - uz_dot(m, box->r, load->g0) - uz_long_dot(d, box->u, x->sparse.p));
     return status;
 }
 
@@ -606,7 +607,7 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
     status = uz_projected_close(part, x->u, load->h, err);
     for (bool right = true; status == UZ_OK && right; tolerance = least) {
         uz_sparse_multiply(load, x->cg.z, x->u);
-        const double norm = fmin(uz_root(uz_dot(dual->d, x->u, x->cg.z)), most > 0.0 ? most : INFINITY);
+        const double norm = fmin(uz_root(uz_long_dot(dual->d, x->u, x->cg.z)), most > 0.0 ? most : INFINITY);
         status = solve_projected(x, part, &right, g, active, tolerance, tolerance > least, norm, err);
         right = right && tolerance > least;
     }
