@@ -2,7 +2,9 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -85,25 +87,32 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
     }
 }
 
-/* Sorts each bucket by its items' corners. */
-static uz_status sort_buckets(uz_corner_table *table, const uz_mesh *mesh, uz_error *err)
+/* Buckets as the threads that share them see them. */
+typedef struct {
+    uz_corner_table *table;
+    const uz_mesh *mesh;
+    int64_t largest; /* items of a bucket */
+    atomic_bool no_memory;
+} sorting;
+
+/* Those of some nodes, by their items' corners. */
+static void sort_buckets(void *ctx, int64_t begin, int64_t end)
 {
     enum { FEW = 16 }; /* in a bucket, but in meshes made to be hard: a node is the lowest of a few sides */
-    int64_t largest = 0, corner[UZ_MOST_CORNERS];
-    for (int64_t i = 0; i < mesh->n_nodes; i++)
-        if (table->start[i + 1] - table->start[i] > largest)
-            largest = table->start[i + 1] - table->start[i];
-    sort_entry *entry = uz_alloc(largest, sizeof *entry);
+    sorting *x = ctx;
+    const uz_corner_table *table = x->table;
+    int64_t corner[UZ_MOST_CORNERS];
+    sort_entry *entry = uz_alloc(x->largest, sizeof *entry);
     if (!entry)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
-    for (int64_t node = 0; node < mesh->n_nodes; node++) {
+        x->no_memory = true;
+    for (int64_t node = begin; entry && node < end; node++) {
         uz_face *item = table->item + table->start[node];
         unsigned char *same = table->same + table->start[node];
         const int64_t count = table->start[node + 1] - table->start[node];
         for (int64_t i = 0; i < count; i++) {
             sort_entry added = {.item = item[i]};
             int64_t j = i;
-            sorted_corners(corner, mesh, item[i]);
+            sorted_corners(corner, x->mesh, item[i]);
             memcpy(added.corner, corner + 1, sizeof added.corner);
             for (; count <= FEW && j > 0 && compare_entries(&entry[j - 1], &added) > 0; j--)
                 entry[j] = entry[j - 1];
@@ -116,9 +125,7 @@ static uz_status sort_buckets(uz_corner_table *table, const uz_mesh *mesh, uz_er
             same[i] = i > 0 && compare_corners(entry[i].corner, entry[i - 1].corner) == 0;
         }
     }
-    table->same[table->count] = 0;
     free(entry);
-    return UZ_OK;
 }
 
 uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool sides, uz_error *err)
@@ -133,18 +140,21 @@ uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool 
         out->item = uz_alloc(out->count, sizeof *out->item);
         out->same = uz_alloc(out->count + 1, sizeof *out->same);
     }
-    uz_status status = UZ_OK;
-    if (!out->start || !out->item || !out->same) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
-    } else {
+    sorting x = {.table = out, .mesh = mesh, .no_memory = !out->start || !out->item || !out->same};
+    if (!x.no_memory) {
         walk_items(out, mesh, sides, true);
         memmove(out->start + 1, out->start, (size_t)mesh->n_nodes * sizeof *out->start); /* placing moved each on */
         out->start[0] = 0;
-        status = sort_buckets(out, mesh, err);
+        for (int64_t i = 0; i < mesh->n_nodes; i++)
+            if (out->start[i + 1] - out->start[i] > x.largest)
+                x.largest = out->start[i + 1] - out->start[i];
+        uz_by_pieces(sort_buckets, &x, mesh->n_nodes);
+        out->same[out->count] = 0;
     }
-    if (status != UZ_OK)
-        uz_corner_table_clear(out);
-    return status;
+    if (!x.no_memory)
+        return UZ_OK;
+    uz_corner_table_clear(out);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
 }
 
 void uz_corner_table_clear(uz_corner_table *table)
