@@ -78,8 +78,9 @@ static inline double uz_sparse_weight(const uz_csc *K, int64_t j)
 void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x);
 
 /* Steps of solve_active: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep);
- * false: the bounds contradict each other. force = K u - p and size = |K| |u| + |p|, what its rounding is in proportion
- * to, roughly: an estimate of it, for less; r from what holds the dofs, `active` the rows that do; the gaps. */
+ * false: the bounds contradict each other. force = K u - p and, of held dofs, size = |K| |u| + |p|, what its rounding
+ * is in proportion to, roughly: an estimate of it, for less; r from what holds the dofs, `active` the rows that do; the
+ * gaps. */
 bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep);
 void uz_bounded_balance(const uz_sparse_load *x, bool roughly);
 void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active);
