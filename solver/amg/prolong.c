@@ -17,31 +17,33 @@
 /* A mode that differs less than this from the span of earlier ones on an aggregate adds nothing there. */
 #define DEPENDENT 1e-4
 
-uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *aggregate, int64_t nodes, int b,
-                       int64_t aggregates, int k, uz_error *err)
+/* Aggregates as the threads that share them see them. */
+typedef struct {
+    float *basis, *coarse;
+    const float *modes;
+    const int64_t *start; /* of the members of each in `node` */
+    const int32_t *node;
+    int64_t aggregates, longest; /* members of one, at most */
+    int b, k, parts;
+    double *room; /* parts x longest x b x k */
+} factoring;
+
+/* Modified Gram-Schmidt on the modes of each, Q_old = Q R; dependent columns become 0. */
+static void factor_part(void *ctx, int part)
 {
-    const int64_t n = nodes * b;
-    int64_t *start = uz_alloc_zero(aggregates + 2, sizeof *start), longest = 0;
-    int32_t *node = uz_alloc(nodes, sizeof *node);
-    double *Q = NULL;
-    if (start && node) {
-        uz_list_members(start, node, aggregate, nodes, aggregates);
-        for (int64_t a = 0; a < aggregates; a++)
-            longest = start[a + 1] - start[a] > longest ? start[a + 1] - start[a] : longest;
-        Q = uz_alloc(longest * b * k, sizeof *Q);
-    }
-    memset(basis, 0, (size_t)(n * k) * sizeof *basis);
-    memset(coarse, 0, (size_t)(aggregates * k * k) * sizeof *coarse);
-    for (int64_t a = 0; Q && a < aggregates; a++) {
-        const int64_t members = start[a + 1] - start[a], rows = members * b, each = (int64_t)b * k;
-        const int32_t *own = node + start[a];
+    const factoring *x = ctx;
+    const int b = x->b, k = x->k;
+    const int64_t each = (int64_t)b * k, end = x->aggregates * (part + 1) / x->parts;
+    double *Q = x->room + part * x->longest * each;
+    for (int64_t a = x->aggregates * part / x->parts; a < end; a++) {
+        const int64_t members = x->start[a + 1] - x->start[a], rows = members * b;
+        const int32_t *own = x->node + x->start[a];
         for (int64_t i = 0; i < members; i++)
             for (int64_t c = 0; c < each; c++)
-                Q[i * each + c] = (double)modes[own[i] * each + c];
-        /* modified Gram-Schmidt on the k columns of Q, Q_old = Q R; dependent columns become 0 */
+                Q[i * each + c] = (double)x->modes[own[i] * each + c];
         for (int c = 0; c < k; c++) {
             double before = 0.0, after = 0.0;
-            float *R = coarse + a * k * k;
+            float *R = x->coarse + a * k * k;
             for (int64_t i = 0; i < rows; i++)
                 before += Q[i * k + c] * Q[i * k + c];
             for (int other = 0; other < c; other++) {
@@ -62,12 +64,35 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
         }
         for (int64_t i = 0; i < members; i++)
             for (int64_t c = 0; c < each; c++)
-                basis[own[i] * each + c] = (float)Q[i * each + c];
+                x->basis[own[i] * each + c] = (float)Q[i * each + c];
     }
-    bool ok = Q != NULL;
+}
+
+/* Aggregates of a part, at least: some 0.2 ms. */
+enum { AGGREGATES_LEAST = 256 };
+
+uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *aggregate, int64_t nodes, int b,
+                       int64_t aggregates, int k, uz_error *err)
+{
+    const int64_t n = nodes * b;
+    const int parts = aggregates < 2 * AGGREGATES_LEAST ? 1 : uz_aside_threads();
+    int64_t *start = uz_alloc_zero(aggregates + 2, sizeof *start);
+    int32_t *node = uz_alloc(nodes, sizeof *node);
+    factoring x = {basis, coarse, modes, start, node, aggregates, 0, b, k, parts, NULL};
+    if (start && node) {
+        uz_list_members(start, node, aggregate, nodes, aggregates);
+        for (int64_t a = 0; a < aggregates; a++)
+            x.longest = start[a + 1] - start[a] > x.longest ? start[a + 1] - start[a] : x.longest;
+        x.room = uz_alloc(parts * x.longest * b * k, sizeof *x.room);
+    }
+    memset(basis, 0, (size_t)(n * k) * sizeof *basis);
+    memset(coarse, 0, (size_t)(aggregates * k * k) * sizeof *coarse);
+    const bool ok = x.room != NULL;
+    if (ok)
+        uz_aside_share(factor_part, &x, parts);
     free(start);
     free(node);
-    free(Q);
+    free(x.room);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
 }
 
