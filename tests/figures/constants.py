@@ -97,6 +97,7 @@ PHRASES = {
     "A ring of 9.5..10.5 that is squeezed by a twentieth of its height errs by 7.7 % and turns by less than 0.1 rad": None,  # test_weigh
     "a cantilever of 10 x 0.2 errs by 3.5 % where its end turns by 0.06.": None,  # the same
     "no row is closer than -1e-9 of the body's extent": None, "no deeper than 0.03 of the side": constant(0.03, r"#define CUTS_IN +([\d.]+)"),
+    "Once a step is less than 0.03 in the energy's norm": constant(0.03, r"#define CHORD_STEP +([\d.]+)"),
     "It runs for ten minutes of processor time and in 8 GiB at most.": lambda program: all(one in (program.root / "client/request/cad.c").read_text() for one in ("MOST_SECONDS 600", "(rlim_t)8 << 30")),
     "does not strain them by more than 0.01 per radian": constant(0.01, r"#define MOST_TIED ([\d.]+)"), "more than 0.01 for one radian is refused": None,
     "(rows leave 0.01 at most": constant(0.01, r"#define SLACK ([\d.]+)"),
