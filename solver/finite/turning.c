@@ -152,9 +152,11 @@ void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
     memset(metric->K_fixed.val, 0, (size_t)metric->K_fixed.ptr[metric->K_fixed.cols] * sizeof *metric->K_fixed.val);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         uz_element element;
-        double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS] = {0}, xyz[3 * UZ_ELEMENT_NODES];
+        double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], xyz[3 * UZ_ELEMENT_NODES];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
+        const size_t n = (size_t)(mesh->dim * count);
+        memset(ke, 0, n * n * sizeof *ke);
         uz_body_element(&element, xyz, model, e);
         if (mesh->dim == 2)
             add_metric(ke, &element, 2);

@@ -164,16 +164,18 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err);
 /* The contact problem of run->K, p and at.h: run->last. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
+/* The setup of run->K and the rows of a place: that of a contact problem solved last, or, after
+ * uz_finite_forget_factors, a new one. The caller releases it (run/setup_cache.h) to run->cache. */
+uz_status uz_finite_acquire(uz_setup **out, uz_finite_run *run, const uz_finite_place *place, uz_error *err);
 
 /* Of the step that run->last leads to: sqrt(v'K v) over the root of twice the energy; 0 where that energy is rounding.
  */
 double uz_finite_step_norm(uz_finite_run *run);
 double uz_finite_norm(uz_finite_run *run); /* of the step run->v */
 
-/* Steps on the factor of the contact problem that led to run->at. begin: takes its setup, as long as run->K is that of
- * the problem and run->trial where it began. to (n), r (n_r): the place that a step from run->at leads to and its
- * reactions; norm: of the step. *found false: rows that press would have to open, or others are penetrated. */
-uz_status uz_finite_chord_begin(uz_setup **setup, uz_finite_run *run, uz_error *err);
+/* A step from run->at on the setup of the contact problem that led there, as long as run->K is that problem's. to (n),
+ * r (n_r): the place that it leads to and its reactions; norm: its own. *found false: rows that press would have to
+ * open, or others are penetrated. */
 uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_finite_run *run, const uz_setup *setup,
                           uz_error *err);
 

@@ -16,7 +16,6 @@
 #include "core/error.h"
 #include "dual/dual.h"
 #include "linalg/blas.h"
-#include "run/setup_cache.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,14 +23,6 @@
 
 /* A gap below this part of the body's extent is one. */
 #define NO_GAP 1e-11
-
-uz_status uz_finite_chord_begin(uz_setup **setup, uz_finite_run *run, uz_error *err)
-{
-    const uz_qp qp = {*run->K, run->trial.rows.N, run->p, run->trial.h}; /* where it began */
-    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = qp};
-    uz_reuse reused;
-    return uz_setup_acquire(setup, &reused, run->cache, &problem, NULL, &run->settings, &run->hooks, err);
-}
 
 /* run->p = f + N(u)'r, with what stiffness along pressed rows makes of their gaps, about whose being closed it is. */
 static void find_forces(uz_finite_run *run)

@@ -305,6 +305,17 @@ static uz_status name_matrix(uz_finite_run *run, const uz_csc *K, uz_error *err)
     return status;
 }
 
+uz_status uz_finite_acquire(uz_setup **out, uz_finite_run *run, const uz_finite_place *place, uz_error *err)
+{
+    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, place->rows.N, run->p, place->h}};
+    uz_reuse reused;
+    *out = NULL;
+    const uz_status status = name_matrix(run, run->K, err);
+    return status == UZ_OK
+               ? uz_setup_acquire(out, &reused, run->cache, &problem, NULL, &run->settings, &run->hooks, err)
+               : status;
+}
+
 uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err)
 {
     const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
@@ -803,7 +814,8 @@ static uz_status may_be_carried(bool *may, uz_finite_run *run, const double *to,
     uz_status status = UZ_OK;
     for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
         uz_obstacle *obstacle = NULL;
-        if (run->scene.contacts[k].kind == UZ_OBSTACLE_BODY)
+        const uz_obstacle_kind kind = run->scene.contacts[k].kind;
+        if (kind == UZ_OBSTACLE_BODY || kind == UZ_OBSTACLE_PLANE) /* nothing is behind a plane */
             continue;
         status = uz_obstacle_new(&obstacle, &run->scene.contacts[k], k, run->scene.model, err);
         for (int64_t i = 0; status == UZ_OK && i < rows->m && *may; i++) {
@@ -865,7 +877,7 @@ static uz_status follow_chords(bool *done, uz_part *out, uz_finite_run *run, dou
     if (!goes_on)
         return UZ_OK;
     double *r = uz_alloc(run->n_r, sizeof *r);
-    uz_status status = r ? uz_finite_chord_begin(&setup, run, err)
+    uz_status status = r ? uz_finite_acquire(&setup, run, &run->trial, err)
                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)run->n_r);
     for (int k = MOST_CHORDS; status == UZ_OK && goes_on && k > 0; k--) {
         double now;

@@ -347,15 +347,12 @@ static uz_status iterate(correction *x, uz_error *err)
 uz_status uz_finite_correct(uz_finite_run *run, uz_error *err)
 {
     const int64_t d = run->d, m = run->at.rows.m;
-    const uz_qp qp = {*run->K, run->at.rows.N, run->p, run->at.h};
-    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = qp};
     uz_setup *setup = NULL;
-    uz_reuse reused;
     double *room = uz_alloc_zero((DIRECTIONS + 9) * d + 5 * m + 2 * run->n, sizeof *room);
     bool *marks = uz_alloc(2 * m, sizeof *marks);
-    uz_status status =
-        room && marks ? uz_setup_acquire(&setup, &reused, run->cache, &problem, NULL, &run->settings, &run->hooks, err)
-                      : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
+    uz_status status = room && marks
+                           ? uz_finite_acquire(&setup, run, &run->at, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld dofs", (long long)d);
     if (status == UZ_OK) {
         /* of the first step the norm is infinite, or not known; nor more than the answer is asked for, as far as this
          * step goes */

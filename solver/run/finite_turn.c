@@ -7,24 +7,35 @@
  * next step begins there, and the certificate asks nothing of how it was reached. */
 #include "run/finite.h"
 
+#include "core/alloc.h"
+#include "core/error.h"
+#include "dual/dual.h"
 #include "finite/turning.h"
+#include "run/setup_cache.h"
 
-#include <string.h>
+#include <stdlib.h>
 
-/* u = K^-1 p on the metric, which takes the tangent's place: no contact has a say in it. *solved: to the accuracy of
- * steps. */
-static uz_status solve_metric(bool *solved, uz_finite_run *run, uz_error *err)
+/* run->v = K^-1 p on the metric, which takes the tangent's place: no contact has a say in it, but its dofs come last,
+ * so that the order of tangents does. */
+static uz_status solve_metric(uz_finite_run *run, uz_error *err)
 {
-    const uz_qp linear = {.K = run->tangent.K, .p = run->p};
-    uz_result *result = NULL;
-    *solved = false;
-    const uz_status status = uz_finite_solve(&result, run, &linear, err);
-    if (status != UZ_OK)
-        return status;
-    *solved = result->summary.outcome == UZ_CONVERGED || result->summary.outcome == UZ_PRECISION_LIMIT;
-    memcpy(run->v, result->u, (size_t)run->d * sizeof *run->v);
-    uz_result_free(result);
-    return UZ_OK;
+    uz_setup *setup = NULL;
+    uz_dual_load *load = NULL;
+    const uz_stop stop = {&run->hooks, run->deadline};
+    double *none = uz_alloc_zero(run->at.rows.m, sizeof *none);
+    uz_status status = none
+                           ? uz_finite_acquire(&setup, run, &run->at, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)run->at.rows.m);
+    if (status == UZ_OK)
+        status = uz_dual_load_create(&load, setup->dual, run->K, run->p, run->at.h, err);
+    if (status == UZ_OK)
+        status = uz_dual_load_aim(load, run->settings.relative_error, &stop, err);
+    if (status == UZ_OK)
+        status = uz_dual_load_recover(load, run->v, none, false, err);
+    uz_dual_load_free(load);
+    uz_setup_release(run->cache, setup);
+    free(none);
+    return status;
 }
 
 uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
@@ -41,8 +52,8 @@ uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
     uz_turning_metric(&run->tangent, model);
     uz_gather_nodal(run->p, model, force);
     uz_finite_move_supports(&moved, run);
-    const uz_status status = solve_metric(turned, run, err);
-    if (status != UZ_OK || !*turned)
+    const uz_status status = solve_metric(run, err);
+    if (status != UZ_OK)
         return status;
     uz_restrict_nodal(run->Kv, model, run->at.u);
     for (int64_t j = 0; j < run->d; j++)
