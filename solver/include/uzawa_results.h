@@ -183,7 +183,7 @@ typedef struct {
     int64_t failed; /* and those */
     int64_t qps;    /* contact problems on a tangent that were solved, all together */
     int64_t most;   /* of these in one step that did not fail */
-    int64_t held; /* those whose tangent was positive definite only with the pressed rows stiff: they keep it stable */
+    int64_t held; /* those whose tangent had stiffness along pressed rows: they keep it stable, or it has just turned */
     int64_t shifted;  /* those where that was not enough, and stiffness of the undeformed body was added */
     double least_det; /* of the deformation gradient, at quadrature points and corners */
     double residual;  /* by which the answer's own Newton step would change it: in the norm of the tangent, relative to

@@ -490,6 +490,8 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         step[i] = run->at.u[i] - run->trial.u[i];
     for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
         pressed = pressed || run->r[i] < 0;
+    if (pressed && run->turned && !roughly && add.hold == 0 && add.shift == 0)
+        add.hold = LEAST_HOLD; /* without it about half of the tangents of turned bodies are not positive definite */
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
         uz_finite_forget_factors(run);
