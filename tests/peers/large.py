@@ -105,7 +105,7 @@ def by_daemon(s, scene):
     body, took = request(scene), []
     for _ in range(RUNS):
         before = s.settle()
-        jobs = [s.solve(body) for _ in range(5)]  # a clock of hundredths of a second
+        jobs = [s.solve(body) for _ in range(5)]
         took.append((s.spent() - before) / len(jobs))
     summary = jobs[0]["summary"]
     if summary["outcome"] != "converged":
