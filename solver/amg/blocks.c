@@ -359,14 +359,14 @@ uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inv
         for (int c = 0; c < b; c++) {
             for (int r = c; r < b; r++) {
                 const bool there = inverse[j * b + c] > 0.0F && inverse[j * b + r] > 0.0F;
-                out->idx[at] = j * b + r;
+                out->idx[at] = (int32_t)(j * b + r);
                 out->val[at++] = there ? A->diag[j * size + r * b + c] : r == c ? 1.0 : 0.0;
             }
             for (int64_t e = below.ptr[j]; e < below.ptr[j + 1]; e++)
                 for (int r = 0; r < b; r++) {
                     const int64_t i = below.node[e] * (int64_t)b + r;
                     const bool there = inverse[j * b + c] > 0.0F && inverse[i] > 0.0F;
-                    out->idx[at] = i;
+                    out->idx[at] = (int32_t)i;
                     out->val[at++] = there ? A->off[below.at[e] * size + r * b + c] : 0.0;
                 }
             out->ptr[j * b + c + 1] = at;

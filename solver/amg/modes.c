@@ -40,7 +40,7 @@ uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err)
     int32_t *node = uz_alloc(n, sizeof *node);
     uz_status status = UZ_ERR_MEMORY;
     memset(out, 0, sizeof *out);
-    if (head && place && node && uz_group_dofs(head, K->ptr, K->idx, n, NULL, 0)) {
+    if (head && place && node && uz_group_dofs(head, K, NULL, 0)) {
         /* node[i]: the number of i's group; place[i]: how many of its group come before i, and while it counts, of the
          * first of a group the next place; most: the largest group. */
         int64_t groups = 0;

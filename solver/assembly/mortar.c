@@ -379,13 +379,17 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
     uz_csc_clear(&M);
     status = room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err)
                   : uz_no_memory(err, UZ_OF_SURFACES);
-    free(node);
     free(place);
     free(value);
-    if (status != UZ_OK)
+    if (status != UZ_OK) {
+        free(node);
         return status;
+    }
+    for (int64_t q = 0; q < M.ptr[M.cols]; q++)
+        node[q] = M.idx[q];
+    free(M.idx);
     sites->first = M.ptr;
-    sites->node = M.idx;
+    sites->node = node;
     sites->weight = M.val;
     return UZ_OK;
 }

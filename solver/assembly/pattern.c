@@ -27,7 +27,7 @@ typedef struct {
     int64_t *seen; /* n_nodes: 1 + the last node whose neighbours it was counted among */
     int64_t *near; /* neighbours of the node at hand, itself included */
     int64_t n_near;
-    int64_t *rows; /* their free dofs */
+    int32_t *rows; /* their free dofs */
 } walk;
 
 static void find_near(walk *w, int64_t a, bool ascending)
@@ -68,7 +68,7 @@ static void count_entries(const walk *w, int64_t a)
 }
 
 /* The rows of a column: the last of these. */
-static void fill_column(uz_csc *A, int64_t column, const int64_t *rows, int64_t count)
+static void fill_column(uz_csc *A, int64_t column, const int32_t *rows, int64_t count)
 {
     const int64_t end = A->ptr[column + 1];
     for (int64_t k = A->ptr[column]; k < end; k++) /* too short for a call of memcpy */
@@ -92,7 +92,7 @@ static void fill_columns(const walk *w, int64_t a)
     for (int64_t i = 0; i < w->n_near; i++)
         for (int c = 0; c < dim; c++) {
             const int64_t row = model->dof[w->near[i] * dim + c];
-            w->rows[count] = row;
+            w->rows[count] = (int32_t)row;
             count += row >= 0;
         }
     for (int c = 0; c < dim; c++)

@@ -209,7 +209,7 @@ static uz_status begin_stiffness(uz_csc *K, const int64_t *first, const uz_bound
         for (int64_t c = first[i]; c < first[i + 1]; c++) {
             for (int k = 0; k < n; k++)
                 for (int64_t r = k == 0 ? c : first[beside[k]]; r < first[beside[k] + 1]; r++)
-                    K->idx[count++] = r;
+                    K->idx[count++] = (int32_t)r;
             K->ptr[c + 1] = count;
         }
     }

@@ -4,7 +4,6 @@
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
-#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -75,9 +74,13 @@ bool uz_brick_init(uz_brick *brick)
 
 uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
 {
-    uz_status status = uz_csc_init_diagonal(out, brick->d, err);
+    const uz_status status = uz_csc_init(out, brick->d, brick->d, brick->d, err);
     if (status != UZ_OK)
         return status;
+    for (int64_t j = 0; j < brick->d; j++) {
+        out->ptr[j + 1] = j + 1;
+        out->idx[j] = (int32_t)j;
+    }
     int64_t node = 0;
     for (int64_t k = 0; k <= brick->cells[2]; k++)
         for (int64_t j = 0; j <= brick->cells[1]; j++)

@@ -198,7 +198,7 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
     if (b >= 0) {
         const lanes moved = ((const lanes *)c->c)[b * HALVES + half];
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
-            add_product(hi, lo, -N->val[k], (const lanes *)c->r + N->idx[k] * HALVES + half, fused);
+            add_product(hi, lo, -N->val[k], (const lanes *)c->r + (int64_t)N->idx[k] * HALVES + half, fused);
         s->change += moved * (Ku - *p + 0.5 * Kc);
         s->change_size += (lanes)((lane_bits)moved & INT64_MAX) * (forces + (lanes)((lane_bits)Kc & INT64_MAX));
         s->correction_energy += moved * Kc;
@@ -246,7 +246,7 @@ static inline __attribute__((always_inline)) void pass(uz_lane_certifier *c, con
             add_product(&hi1, &lo1, K->val[k++], &u1, fused);
         }
         for (; k < K->ptr[j + 1]; k++) {
-            const int64_t i = K->idx[k] * HALVES;
+            const int64_t i = (int64_t)K->idx[k] * HALVES;
             const double a = K->val[k];
             add_product(&hi0, &lo0, a, u + i, fused);
             add_product(&hi1, &lo1, a, u + i + 1, fused);
@@ -290,10 +290,10 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     }
     /* Kc is zero but for the rows that contact dofs couple to */
     for (int64_t k = 0; k < K_b->ptr[K_b->cols]; k++)
-        c->Kc[K_b->idx[k] * WIDTH + lane] = 0.0;
+        c->Kc[(int64_t)K_b->idx[k] * WIDTH + lane] = 0.0;
     for (int64_t b = 0; b < K_b->cols; b++)
         for (int64_t k = K_b->ptr[b]; k < K_b->ptr[b + 1]; k++)
-            c->Kc[K_b->idx[k] * WIDTH + lane] += K_b->val[k] * c->c[b * WIDTH + lane];
+            c->Kc[(int64_t)K_b->idx[k] * WIDTH + lane] += K_b->val[k] * c->c[b * WIDTH + lane];
     for (int64_t i = 0; i < f->m; i++)
         energies->pressed -= a->r[i] * f->size[i];
     terms->complementarity = uz_feasible_complementarity(f, a->r, feasible);

@@ -98,7 +98,7 @@ static inline __attribute__((always_inline)) void add_lanes(const product_of *q,
 static inline __attribute__((always_inline)) void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end,
                                                             double x_j, int fused)
 {
-    const int64_t *idx = q->A->idx;
+    const int32_t *idx = q->A->idx;
     const four x_j4 = {x_j, x_j, x_j, x_j};
     const two x_j2 = {x_j, x_j};
     while (k < end) {
@@ -209,7 +209,8 @@ static inline __attribute__((always_inline)) void take_rest(const product_of *q,
 static inline __attribute__((always_inline)) void take_pair(const product_of *q, int64_t j, int fused)
 {
     const uz_csc *A = q->A;
-    const int64_t *idx = A->idx, middle = A->ptr[j + 1];
+    const int32_t *idx = A->idx;
+    const int64_t middle = A->ptr[j + 1];
     const two x_a = {q->x[j], q->x[j]}, x_b = {q->x[j + 1], q->x[j + 1]};
     const four x_a4 = {x_a[0], x_a[0], x_a[0], x_a[0]}, x_b4 = {x_b[0], x_b[0], x_b[0], x_b[0]};
     int64_t k = A->ptr[j], l = middle;

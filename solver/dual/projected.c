@@ -66,7 +66,7 @@ static uz_status make_matrix(uz_csc *G, const uz_projected *x, uz_error *err)
         for (int64_t k = 0; k < n; k++) {
             const int64_t count = add_column(sum, met, seen, x, place, k);
             for (int64_t s = 0; pass == 1 && s < count; s++) {
-                G->idx[at + s] = met[s];
+                G->idx[at + s] = (int32_t)met[s];
                 G->val[at + s] = sum[met[s]];
             }
             at += count;

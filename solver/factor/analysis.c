@@ -38,18 +38,6 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
     uz_expect_factor(K);
-    cholmod_sparse A = {.nrow = (size_t)K->rows,
-                        .ncol = (size_t)K->cols,
-                        .nzmax = (size_t)K->ptr[K->cols],
-                        .p = K->ptr,
-                        .i = K->idx,
-                        .x = K->val,
-                        .stype = -1,
-                        .itype = CHOLMOD_LONG,
-                        .xtype = CHOLMOD_REAL,
-                        .dtype = CHOLMOD_DOUBLE,
-                        .sorted = 1,
-                        .packed = 1};
     atomic_init(&analysis->holders, 1);
     analysis->n = K->cols;
     analysis->nnz = K->ptr[K->cols];
@@ -60,7 +48,7 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
     const bool ok = analysis->last && analysis->position && group;
     if (ok && n_dofs > 0)
         memcpy(analysis->last, dofs, (size_t)n_dofs * sizeof *dofs);
-    cholmod_sparse *graph = ok ? uz_compress(group, &A, analysis->last, n_dofs, &common) : NULL;
+    cholmod_sparse *graph = ok ? uz_compress(group, K, analysis->last, n_dofs, &common) : NULL;
     uz_status status =
         graph ? uz_choose(analysis, graph, group, rows, ordering, &common, err)
               : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)K->cols);

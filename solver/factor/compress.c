@@ -21,9 +21,10 @@ static uint64_t mix(uint64_t x)
 /* Groups are told by sum[i]: of mix(j) over the neighbours j of i and i itself, and something else
  * for the last dofs. Equal sums mean equal neighbourhoods but for a chance of 2^-64, and a wrong guess costs fill,
  * never correctness: the graph has an edge for every entry of the matrix. */
-bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
-                   int64_t n_last)
+bool uz_group_dofs(int64_t *head, const uz_csc *A, const int64_t *last, int64_t n_last)
 {
+    const int64_t n = A->cols, *ptr = A->ptr;
+    const int32_t *idx = A->idx;
     uint64_t *sum = uz_alloc(n, sizeof *sum);
     if (!sum)
         return false;
@@ -55,13 +56,14 @@ bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_
 /* Counts the edges between groups by the column they belong to, or places them (rows not NULL) at next[column]. An edge
  * met before in the same group's columns, mostly neighbours, is left out; some come twice all the same. mark: a place
  * for each group. */
-static void collect_edges(SuiteSparse_long *next, SuiteSparse_long *rows, int64_t *mark, const cholmod_sparse *A,
+static void collect_edges(SuiteSparse_long *next, SuiteSparse_long *rows, int64_t *mark, const uz_csc *A,
                           const int64_t *group, int64_t groups)
 {
-    const SuiteSparse_long *ptr = A->p, *idx = A->i;
+    const int64_t *ptr = A->ptr;
+    const int32_t *idx = A->idx;
     for (int64_t g = 0; g < groups; g++)
         mark[g] = -1;
-    for (int64_t j = 0; j < (int64_t)A->ncol; j++) {
+    for (int64_t j = 0; j < A->cols; j++) {
         int64_t own = group[j];
         for (int64_t k = ptr[j]; k < ptr[j + 1]; k++) {
             int64_t other = group[idx[k]], column = other < own ? other : own;
@@ -75,12 +77,12 @@ static void collect_edges(SuiteSparse_long *next, SuiteSparse_long *rows, int64_
     }
 }
 
-cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
+cholmod_sparse *uz_compress(int64_t *group, const uz_csc *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common)
 {
-    const int64_t n = (int64_t)A->ncol;
+    const int64_t n = A->cols;
     int64_t groups = 0, edges = 0;
-    if (!uz_group_dofs(group, A->p, A->i, n, last, n_last))
+    if (!uz_group_dofs(group, A, last, n_last))
         return NULL;
     for (int64_t j = 0; j < n; j++) /* from heads to numbers, in the order of the heads */
         group[j] = group[j] == j ? groups++ : group[group[j]];

@@ -129,10 +129,9 @@ size_t uz_principal_bytes(const uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);
 
-/* head[i] (n): the first dof of i's group: dofs with the same neighbours in a matrix (ptr, idx: columns of its lower
- * triangle), as those of a node have, and either all or none of them among the n_last dofs `last`. false: no memory. */
-bool uz_group_dofs(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
-                   int64_t n_last);
+/* head[i] (n): the first dof of i's group: dofs with the same neighbours in a matrix (A: its lower triangle), as those
+ * of a node have, and either all or none of them among the n_last dofs `last`. false: no memory. */
+bool uz_group_dofs(int64_t *head, const uz_csc *A, const int64_t *last, int64_t n_last);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);

@@ -73,7 +73,7 @@ void uz_expect_factor(const uz_csc *K);
 /* The graph of groups of dofs with equal neighbours (lower triangle without diagonal, pattern), freed by
  * cholmod_l_free_sparse; NULL: no memory. A: lower triangle. The n_last dofs `last` are in groups without others.
  * group[i] (n): the number of i's group, in the order of their first dofs. */
-cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
+cholmod_sparse *uz_compress(int64_t *group, const uz_csc *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common);
 
 /* Fills perm (nodes) with a fill-reducing ordering of the graph of groups (not AUTO) that keeps the n_last groups

@@ -15,11 +15,12 @@ extern "C" {
 typedef struct {
     int64_t rows, cols;
     int64_t *ptr; /* cols + 1 */
-    int64_t *idx; /* ptr[cols], row of each entry */
+    int32_t *idx; /* ptr[cols], row of each entry */
     double *val;  /* ptr[cols] */
 } uz_csc;
 
-/* Allocates ptr, idx, val for `nnz` entries, all zero. A previous content of *A is not freed. */
+/* Allocates ptr, idx, val for `nnz` entries, all zero. A previous content of *A is not freed. Errors: UZ_ERR_ARGUMENT,
+ * _LIMIT (more than 2^31 - 1 rows), _MEMORY. */
 uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err);
 void uz_csc_clear(uz_csc *A); /* frees the arrays and zeroes *A */
 uz_status uz_csc_copy(uz_csc *out, const uz_csc *A, uz_error *err);

@@ -106,7 +106,7 @@ static uz_status sort_columns(uz_csc *A, int64_t **col, int64_t count, int64_t *
             if (places[at].row == places[at - 1].row && (*repeated < 0 || places[at].k < *repeated))
                 *repeated = places[at].k;
     for (int64_t at = 0; at < count; at++) {
-        A->idx[at] = places[at].row;
+        A->idx[at] = (int32_t)places[at].row;
         val[at] = A->val[places[at].k];
     }
     free(A->val);
@@ -193,7 +193,7 @@ static uz_status read_entries(gather *g, mm_text *text, const uz_mm_info *info)
         }
         if (g->count == g->capacity)
             return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
-        A->idx[g->count] = e.row;
+        A->idx[g->count] = (int32_t)e.row;
         A->val[g->count] = e.value;
         A->ptr[1 + e.col]++;
         if (g->col)

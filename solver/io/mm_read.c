@@ -156,14 +156,17 @@ static const int64_t BYTES_PER_TEXT_BYTE = 64;
 enum { COORDINATE_LINE = 6, ARRAY_LINE = 2 };
 
 /* How many entries to make room for: no more than are announced, and no more than the rest of the text can hold.
- * UZ_ERR_LIMIT: these, of 16 bytes each, and `slots` starts or numbers of 8 bytes may not be allocated for this text.
- */
+ * UZ_ERR_LIMIT: these, of at most 16 bytes each, and `slots` starts or numbers of 8 bytes may not be allocated for this
+ * text, or a uz_csc does not hold so many rows. */
 static uz_status make_room(int64_t *room, const mm_text *text, const uz_mm_info *info, int64_t slots, size_t len,
                            size_t max_bytes)
 {
     const int64_t line = info->format == UZ_MM_COORDINATE ? COORDINATE_LINE : ARRAY_LINE;
     const int64_t most = (int64_t)(text->end - text->at) / line + 1; /* the last line may lack its end */
     int64_t dense, bytes;
+    if (info->rows > INT32_MAX)
+        return uz_fail_line(text->err, UZ_ERR_LIMIT, text->size_line, "a matrix of %lld rows: up to 2^31 - 1 are held",
+                            (long long)info->rows);
     *room = info->entries < most ? info->entries : most;
     if (slots >= 0 && !__builtin_mul_overflow(slots, 8, &dense) && !__builtin_add_overflow(dense, 16 * *room, &bytes) &&
         (max_bytes > 0 ? (uint64_t)bytes <= max_bytes : dense <= FREE_BYTES + BYTES_PER_TEXT_BYTE * (int64_t)len))
@@ -196,7 +199,7 @@ static uz_status read_body(uz_csc *A, mm_text *text, const uz_mm_info *info, int
                     status = uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
                 if (status != UZ_OK)
                     break;
-                A->idx[at] = i;
+                A->idx[at] = (int32_t)i;
                 A->val[at++] = value;
             }
             A->ptr[j + 1] = at;

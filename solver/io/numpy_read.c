@@ -68,7 +68,7 @@ static uz_status read_dense(uz_csc *out, const npy_array *from, size_t limit, uz
             npy_real(&value, from, npy_place(from, i, j), err); /* finite: all were looked at */
             if (value == 0)
                 continue;
-            out->idx[at] = i;
+            out->idx[at] = (int32_t)i;
             out->val[at++] = value;
         }
         out->ptr[j + 1] = at;

@@ -10,7 +10,7 @@
 
 size_t uz_csc_bytes(const uz_csc *A)
 {
-    return A->ptr ? 8 * (size_t)(A->cols + 1) + (A->idx == A->ptr ? 8 : 16) * (size_t)A->ptr[A->cols] : 0;
+    return A->ptr ? 8 * (size_t)(A->cols + 1) + 12 * (size_t)A->ptr[A->cols] : 0;
 }
 
 uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err)
@@ -20,6 +20,8 @@ uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_err
     uz_error_reset(err);
     if (rows < 0 || cols < 0 || nnz < 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "a matrix cannot have negative sizes");
+    if (rows > INT32_MAX)
+        return uz_fail(err, UZ_ERR_LIMIT, "", "a matrix of %lld rows: up to 2^31 - 1 are held", (long long)rows);
     if (cols == INT64_MAX)
         return uz_fail(err, UZ_ERR_MEMORY, "", "a matrix of %lld columns does not fit in memory", (long long)cols);
     made.ptr = uz_alloc_zero(cols + 1, sizeof *made.ptr);
@@ -34,29 +36,12 @@ uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_err
     return UZ_OK;
 }
 
-uz_status uz_csc_init_diagonal(uz_csc *A, int64_t n, uz_error *err)
-{
-    uz_csc made = {.rows = n, .cols = n, .ptr = uz_alloc(n + 1, sizeof *made.ptr)};
-    made.idx = made.ptr; /* 0, 1, 2, ... both */
-    made.val = uz_alloc_zero(n, sizeof *made.val);
-    memset(A, 0, sizeof *A);
-    if (!made.ptr || !made.val) {
-        uz_csc_clear(&made);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a diagonal of %lld entries", (long long)n);
-    }
-    for (int64_t j = 0; j <= n; j++)
-        made.ptr[j] = j;
-    *A = made;
-    return UZ_OK;
-}
-
 void uz_csc_clear(uz_csc *A)
 {
     if (!A)
         return;
-    if (A->idx != A->ptr)
-        free(A->idx);
     free(A->ptr);
+    free(A->idx);
     free(A->val);
     memset(A, 0, sizeof *A);
 }
@@ -105,7 +90,7 @@ uz_status uz_csc_transpose(uz_csc *out, const uz_csc *A, uz_error *err)
     for (int64_t j = 0; nnz > 0 && j < A->cols; j++) {
         for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
             int64_t at = made.ptr[1 + A->idx[k]]++;
-            made.idx[at] = j;
+            made.idx[at] = (int32_t)j;
             made.val[at] = A->val[k];
         }
     }
@@ -146,7 +131,7 @@ uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t 
     counts_to_starts(made.ptr, made.cols);
     for (int64_t k = 0; k < count; k++) {
         int64_t at = made.ptr[1 + col[order[k]]]++;
-        made.idx[at] = row[order[k]];
+        made.idx[at] = (int32_t)row[order[k]];
         made.val[at] = val[order[k]];
     }
     /* Entries that stand next to each other with the same row are added up; the arrays keep their room. */

@@ -9,8 +9,6 @@ uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error
 
 /* What the arrays of A take; 0 for a zeroed struct. */
 size_t uz_csc_bytes(const uz_csc *A);
-/* A diagonal matrix of zeros, whose idx is its ptr: as any other for who reads it or frees it. UZ_ERR_MEMORY. */
-uz_status uz_csc_init_diagonal(uz_csc *A, int64_t n, uz_error *err);
 
 /* Where in A->idx and A->val the first entry of `column` in this row or below is, by bisection: rows ascend in a
  * column. */

@@ -59,7 +59,8 @@ static int64_t begin_of(const column_loop *l, int part)
  * others. */
 static int64_t run_columns(const column_loop *l, int64_t begin, int64_t end, int64_t border, bool beyond)
 {
-    const int64_t *ptr = l->A->ptr, *idx = l->A->idx;
+    const int64_t *ptr = l->A->ptr;
+    const int32_t *idx = l->A->idx;
     int64_t from = begin, other = end;
     for (int64_t j = begin; j < end; j++) {
         if ((ptr[j + 1] > ptr[j] && idx[ptr[j + 1] - 1] >= border) == beyond)

@@ -92,7 +92,7 @@ uz_status uz_symmetric_lower(uz_csc *K, uz_error *err)
         for (int64_t j = 0; j < K->cols; j++) {
             pair_walk walk = {K, &T, j, uz_csc_seek(K, j, j), uz_csc_seek(&T, j, j)};
             for (pair p; walk_next(&walk, &p); at++) {
-                lower.idx[at] = p.i;
+                lower.idx[at] = (int32_t)p.i;
                 lower.val[at] = p.a + 0.5 * (p.b - p.a); /* exactly a where a = b */
             }
             lower.ptr[j + 1] = at;

@@ -70,7 +70,7 @@ uz_status uz_candidates_reduce(uz_csc *out, const uz_csc *N, const uz_candidates
     for (int64_t j = 0; j < N->cols && status == UZ_OK; j++) {
         for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
             if (candidates->in[N->idx[q]]) {
-                out->idx[nnz] = number[N->idx[q]];
+                out->idx[nnz] = (int32_t)number[N->idx[q]];
                 out->val[nnz++] = N->val[q];
             }
         out->ptr[j + 1] = nnz;

@@ -224,7 +224,7 @@ static void leave_tied(balance *b)
         uz_tied_part(contact, b->model, a);
         for (int64_t q = tied->ptr[a]; q < tied->ptr[a + 1]; q++)
             for (int c = 0; c < b->dim; c++) {
-                const int64_t to = tied->idx[q] * b->dim + c;
+                const int64_t to = (int64_t)tied->idx[q] * b->dim + c;
                 b->inner[to] += tied->val[q] * inner[c];
                 b->load[to] += tied->val[q] * load[c];
                 b->contact[to] += tied->val[q] * contact[c];

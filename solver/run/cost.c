@@ -29,7 +29,7 @@ static uz_cost_rates measured; /* written once, under the guard */
 
 typedef struct {
     const double *val, *x;
-    const int64_t *idx;
+    const int32_t *idx;
     int64_t n;
 } entry_pass;
 
@@ -57,7 +57,7 @@ static void multiply_dense(void *ctx)
 static void measure(void)
 {
     enum { ROOM = 2 * DENSE * DENSE, ENTRIES = SPARSE * BAND };
-    const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + ENTRIES * sizeof(int64_t);
+    const size_t bytes = (ROOM + ENTRIES) * sizeof(double) + ENTRIES * sizeof(int32_t);
     double *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     measured = ASSUMED;
     if (room == MAP_FAILED)
@@ -67,8 +67,8 @@ static void measure(void)
     measured.flop_s = uz_least_seconds(multiply_dense, room, 1, REPEATS, ENOUGH_S) / ((double)DENSE * DENSE * DENSE);
     /* a lower triangle with BAND entries in a column, far enough apart to be read as those of a mesh are */
     double *val = room + ROOM;
-    int64_t *idx = (int64_t *)(void *)(val + ENTRIES);
-    for (int64_t k = 0; k < ENTRIES; k++) {
+    int32_t *idx = (int32_t *)(void *)(val + ENTRIES);
+    for (int32_t k = 0; k < ENTRIES; k++) {
         idx[k] = k / BAND + k % BAND / 4 * REACH + k % BAND;
         val[k] = 1.0;
     }
@@ -138,7 +138,7 @@ static double rate_of(const uz_csc *K)
 
 static double matrix_bytes(const uz_cost_size *s)
 {
-    return 16.0 * (double)s->k_entries + 8.0 * (double)s->d + 48.0 * (double)s->n_entries;
+    return 12.0 * (double)s->k_entries + 8.0 * (double)s->d + 36.0 * (double)s->n_entries;
 }
 
 /* predicted: the factor (nnz, flops, bytes, order_s) analysed for the form `of`, whose own differs from it by what

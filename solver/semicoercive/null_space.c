@@ -40,7 +40,7 @@ static uz_status without_empty(uz_csc *out, const uz_csc *K, uz_error *err)
     for (int64_t j = 0, at = 0; status == UZ_OK && j < K->cols; j++) {
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
             if (K->val[q] != 0.0) {
-                out->idx[at] = number[K->idx[q]];
+                out->idx[at] = (int32_t)number[K->idx[q]];
                 out->val[at++] = K->val[q];
             }
         if (used[j])

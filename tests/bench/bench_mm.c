@@ -31,7 +31,7 @@ static uz_status banded(uz_csc *A)
     uz_status status = uz_csc_init(A, DOFS, DOFS, (int64_t)DOFS * PER_COLUMN, NULL);
     for (int64_t j = 0; status == UZ_OK && j < DOFS; j++) {
         for (int64_t i = j; i < DOFS && i < j + (int64_t)PER_COLUMN * 7; i += 7) {
-            A->idx[at] = i;
+            A->idx[at] = (int32_t)i;
             A->val[at++] = some_value(&state);
         }
         A->ptr[j + 1] = at;

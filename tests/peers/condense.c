@@ -1,6 +1,6 @@
 /* condense.c: the dual problem that solvers of complementarity and bound-constrained problems get: D and g0, as a user
  * of CHOLMOD would form them: one factorization, and N' as right-hand sides in blocks that keep its BLAS 3 busy. */
-#include "cholmod_view.h"
+#include "cholmod_copy.h"
 #include "core/alloc.h"
 #include "peers/lab.h"
 
@@ -18,15 +18,17 @@ struct lab_factor {
 lab_factor *lab_factor_new(const uz_csc *K)
 {
     lab_factor *factor = uz_alloc_zero(1, sizeof *factor);
-    cholmod_sparse A = cholmod_view(K);
     if (!factor)
         return NULL;
     factor->d = K->cols;
     cholmod_l_start(&factor->common);
     factor->common.print = 0;
-    factor->L = cholmod_l_analyze(&A, &factor->common);
-    if (factor->L && cholmod_l_factorize(&A, factor->L, &factor->common) && factor->common.status == CHOLMOD_OK &&
-        factor->L->minor == (size_t)K->cols)
+    cholmod_sparse *A = cholmod_copy_of(K, &factor->common);
+    factor->L = A ? cholmod_l_analyze(A, &factor->common) : NULL;
+    const bool ok = factor->L && cholmod_l_factorize(A, factor->L, &factor->common) &&
+                    factor->common.status == CHOLMOD_OK && factor->L->minor == (size_t)K->cols;
+    cholmod_l_free_sparse(&A, &factor->common);
+    if (ok)
         return factor;
     lab_factor_free(factor);
     return NULL;

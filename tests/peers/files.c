@@ -27,13 +27,22 @@ static bool finish(FILE *file, bool ok, const char *path)
 static bool put_matrix(FILE *file, const uz_csc *A)
 {
     int64_t nnz = A->ptr[A->cols];
-    return put(file, A->ptr, A->cols + 1) && put(file, A->idx, nnz) && put(file, A->val, nnz);
+    bool ok = put(file, A->ptr, A->cols + 1);
+    for (int64_t k = 0; k < nnz && ok; k++) {
+        const int64_t row = A->idx[k];
+        ok = put(file, &row, 1);
+    }
+    return ok && put(file, A->val, nnz);
 }
 
 static bool get_matrix(FILE *file, uz_csc *A, int64_t rows, int64_t cols, int64_t nnz)
 {
-    return uz_csc_init(A, rows, cols, nnz, NULL) == UZ_OK && get(file, A->ptr, cols + 1) && get(file, A->idx, nnz) &&
-           get(file, A->val, nnz);
+    bool ok = uz_csc_init(A, rows, cols, nnz, NULL) == UZ_OK && get(file, A->ptr, cols + 1);
+    for (int64_t k = 0, row; k < nnz && ok; k++) {
+        ok = get(file, &row, 1);
+        A->idx[k] = ok ? (int32_t)row : 0;
+    }
+    return ok && get(file, A->val, nnz);
 }
 
 bool peers_write_problem(const char *path, const uz_qp *qp)

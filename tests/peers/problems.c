@@ -118,7 +118,7 @@ static uz_status repeat_rows(uz_qp *qp, uz_error *err)
     for (int64_t j = 0; status == UZ_OK && j < qp->N.cols; j++) {
         for (int copy = 0; copy < 3; copy++)
             for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++, at++) {
-                N.idx[at] = copy * m + qp->N.idx[k];
+                N.idx[at] = (int32_t)(copy * m + qp->N.idx[k]);
                 N.val[at] = factor[copy] * qp->N.val[k];
             }
         N.ptr[j + 1] = at;
@@ -157,17 +157,17 @@ static uz_status chain(uz_qp *out, int64_t d, int64_t stride, double held, uz_er
     if (status == UZ_OK)
         status = uz_csc_init(&out->N, m, d, m, err);
     for (int64_t j = 0, at = 0; status == UZ_OK && j < d; j++) {
-        out->K.idx[at] = j;
+        out->K.idx[at] = (int32_t)j;
         out->K.val[at++] = (j == 0 ? held : 1.0) + (j + 1 < d ? 1.0 : 0.0);
         if (j + 1 < d) {
-            out->K.idx[at] = j + 1;
+            out->K.idx[at] = (int32_t)(j + 1);
             out->K.val[at++] = -1.0;
         }
         out->K.ptr[j + 1] = at;
         out->N.ptr[j + 1] = j / stride + 1;
     }
     for (int64_t i = 0; status == UZ_OK && i < m; i++) {
-        out->N.idx[i] = i;
+        out->N.idx[i] = (int32_t)i;
         out->N.val[i] = 1.0;
     }
     out->p = vector(d);

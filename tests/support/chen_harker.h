@@ -18,12 +18,12 @@ static inline uz_status chen_harker_qp(uz_qp *qp, int64_t n, int64_t n_free, int
         status = uz_csc_init(&qp->N, n, n, n, err);
     for (int64_t j = 0, at = 0; status == UZ_OK && j < n; j++) {
         for (int64_t k = 0; k < 3 && j + k < n; k++, at++) {
-            qp->K.idx[at] = j + k;
+            qp->K.idx[at] = (int32_t)(j + k);
             qp->K.val[at] = stencil[k];
         }
         qp->K.ptr[j + 1] = at;
         qp->N.ptr[j + 1] = j + 1;
-        qp->N.idx[j] = j;
+        qp->N.idx[j] = (int32_t)j;
         qp->N.val[j] = -1.0;
         for (int64_t k = -2; k <= 2; k++) /* p = K u* - r* */
             qp->p[j] += j + k >= 0 && j + k < n_free ? stencil[k < 0 ? -k : k] : 0.0;

@@ -34,7 +34,7 @@ static inline uz_status floor_stiffness(uz_csc *K, int64_t n, bool plate, uz_err
                         value += floor_laplacian(n, k, a + b * n) * floor_laplacian(n, a + b * n, j);
             value = plate ? value : floor_laplacian(n, k, j);
             if (value != 0.0) {
-                K->idx[nnz] = k;
+                K->idx[nnz] = (int32_t)k;
                 K->val[nnz++] = value;
             }
         }
@@ -59,7 +59,7 @@ static inline uz_status floor_qp(uz_qp *qp, int64_t n, bool plate, double sink, 
         double x = (double)(j % n + 1) * step, y = (double)(j / n + 1) * step;
         qp->p[j] = -sink / middle * pow(step, plate ? 4.0 : 2.0) * (1.0 + bumps * sin(23.0 * x) * cos(17.0 * y));
         qp->h[j] = 1.0;
-        qp->N.idx[j] = j;
+        qp->N.idx[j] = (int32_t)j;
         qp->N.val[j] = -1.0;
         qp->N.ptr[j + 1] = j + 1;
     }

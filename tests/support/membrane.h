@@ -23,14 +23,14 @@ static inline uz_status membrane_stiffness(uz_csc *K, const membrane *kind, uz_e
     uz_status status = uz_csc_init(K, d, d, d + 2 * n * (n - 1), err);
     for (int64_t j = 0; status == UZ_OK && j < d; j++) {
         int64_t x = j % n, y = j / n, edges = (x == 0) + (x == n - 1) + (y == 0) + (y == n - 1);
-        K->idx[nnz] = j;
+        K->idx[nnz] = (int32_t)j;
         K->val[nnz++] = 4.0 - (kind->loose ? 1.0 : 0.5) * (double)edges;
         if (x + 1 < n) {
-            K->idx[nnz] = j + 1;
+            K->idx[nnz] = (int32_t)(j + 1);
             K->val[nnz++] = -1.0;
         }
         if (y + 1 < n) {
-            K->idx[nnz] = j + n;
+            K->idx[nnz] = (int32_t)(j + n);
             K->val[nnz++] = -1.0;
         }
         K->ptr[j + 1] = nnz;
@@ -47,11 +47,11 @@ static inline uz_status membrane_rows(uz_csc *N, const membrane *kind, uz_error 
         double value = j % 2 == 0 ? -1.0 : kind->pairs ? -0.5 : 0.0;
         bool used = value != 0.0 && j / 2 < kind->m;
         if (used) {
-            N->idx[nnz] = j / 2;
+            N->idx[nnz] = (int32_t)(j / 2);
             N->val[nnz++] = value;
         }
         if (used && kind->repeated && j / 2 == 0) {
-            N->idx[nnz] = m - 1;
+            N->idx[nnz] = (int32_t)(m - 1);
             N->val[nnz++] = 3.0 * value;
         }
         N->ptr[j + 1] = nnz;

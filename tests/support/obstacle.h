@@ -63,9 +63,9 @@ static inline uz_status obstacle_qp(uz_qp *qp, int64_t n, uz_error *err)
         qp->h[k] = 2000.0;
         qp->h[d + k] = -sin(3.2 * x) * sin(3.3 * y);
         qp->N.ptr[k + 1] = 2 * k + 2;
-        qp->N.idx[2 * k] = k;
+        qp->N.idx[2 * k] = (int32_t)k;
         qp->N.val[2 * k] = 1.0;
-        qp->N.idx[2 * k + 1] = d + k;
+        qp->N.idx[2 * k + 1] = (int32_t)(d + k);
         qp->N.val[2 * k + 1] = -1.0;
     }
     return status;

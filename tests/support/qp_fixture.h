@@ -58,7 +58,7 @@ static inline uz_csc csc_from_dense(const double *dense, int64_t rows, int64_t c
         for (int64_t i = lower ? j : 0; i < rows; i++) {
             if (dense[i * cols + j] == 0)
                 continue;
-            A.idx[at] = i;
+            A.idx[at] = (int32_t)i;
             A.val[at++] = dense[i * cols + j];
         }
         A.ptr[j + 1] = at;

@@ -207,7 +207,7 @@ static uz_csc renumber(const uz_csc *K, const int64_t *to)
     for (int64_t j = 0; j < n; j++)
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
             int64_t a = to[j], b = to[K->idx[k]], at = A.ptr[a < b ? a : b]++;
-            A.idx[at] = a < b ? b : a;
+            A.idx[at] = (int32_t)(a < b ? b : a);
             A.val[at] = K->val[k];
         }
     memmove(A.ptr + 1, A.ptr, (size_t)n * sizeof *A.ptr);

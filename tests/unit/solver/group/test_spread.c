@@ -13,7 +13,8 @@ typedef struct {
     uz_modes modes;
     int32_t node[D];
     float value[D * 2];
-    int64_t ptr[D + 1], idx[D * D];
+    int64_t ptr[D + 1];
+    int32_t idx[D * D];
     double val[D * D];
 } body;
 
@@ -35,7 +36,7 @@ static void fill(body *b, int32_t nodes, bool in_a_row)
     for (int j = 0; j < D; j++) {
         for (int i = j; i < D; i++)
             if (b->dense[i][j] != 0.0) {
-                b->idx[at] = i;
+                b->idx[at] = (int32_t)i;
                 b->val[at++] = b->dense[i][j];
             }
         b->ptr[j + 1] = at;
@@ -187,7 +188,8 @@ TEST(a_cut_through_too_many_couplings_is_none)
 {
     enum { N = 100 };
     double val[2 * N], x[N];
-    int64_t ptr[N + 1] = {0}, idx[2 * N];
+    int64_t ptr[N + 1] = {0};
+    int32_t idx[2 * N];
     int32_t node[N];
     float value[N];
     bool divided;
@@ -196,7 +198,7 @@ TEST(a_cut_through_too_many_couplings_is_none)
         ptr[j + 1] = ptr[j];
         for (int i = j; i < j + 2 && i < N; i++) {
             val[ptr[j + 1]] = i == j ? 2 : -1;
-            idx[ptr[j + 1]++] = i;
+            idx[ptr[j + 1]++] = (int32_t)i;
         }
         node[j] = j;
         value[j] = 1;

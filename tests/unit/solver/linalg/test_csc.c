@@ -3,6 +3,8 @@
 #include "linalg/linalg.h"
 #include "uzawa.h"
 
+#include <string.h>
+
 enum { MOST = 12 };
 
 static uint64_t state = 2463534242u;
@@ -100,7 +102,11 @@ TEST(sizes_that_cannot_be_are_refused)
     uz_error err;
     CHECK_INT(uz_csc_init(&A, -1, 1, 0, &err), UZ_ERR_ARGUMENT);
     CHECK_INT(uz_csc_init(&A, 1, INT64_MAX, 0, &err), UZ_ERR_MEMORY);
-    CHECK_INT(uz_csc_init(&A, 1, 1, INT64_MAX / 4, &err), UZ_ERR_MEMORY);
+    CHECK_INT(uz_csc_init(&A, 1, 1, INT64_MAX, &err), UZ_ERR_MEMORY);
+    CHECK_INT(uz_csc_init(&A, (int64_t)INT32_MAX + 1, 1, 0, &err), UZ_ERR_LIMIT);
+    CHECK(strstr(err.message, "a matrix of 2147483648 rows"));
+    CHECK_INT(uz_csc_init(&A, INT32_MAX, 1, 0, &err), UZ_OK);
+    uz_csc_clear(&A);
     CHECK(A.ptr == NULL && A.idx == NULL && A.val == NULL);
     CHECK_INT(uz_csc_from_triplets(&A, 2, 2, -1, NULL, NULL, NULL, &err), UZ_ERR_ARGUMENT);
 }

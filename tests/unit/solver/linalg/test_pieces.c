@@ -35,7 +35,7 @@ static uz_csc band_matrix(void)
     for (int64_t j = 0; j < COLUMNS; j++) {
         int64_t k = A.ptr[j], row = j;
         for (int e = 0; e < (j % 11 == 0 ? 0 : j % 7 == 0 ? 1 : EACH) && row < COLUMNS; e++) {
-            A.idx[k++] = row;
+            A.idx[k++] = (int32_t)row;
             row += j % 5000 == 1 ? (COLUMNS - j) / EACH + 1 : 1 + j * 7919 % (BAND / EACH);
         }
         A.ptr[j + 1] = k;

@@ -188,12 +188,12 @@ TEST(many_dependent_rows_are_exchanged_in_the_end)
     CHECK_INT(uz_csc_init(&qp.K, D, D, D, &err), UZ_OK);
     CHECK_INT(uz_csc_init(&qp.N, 2 * (D - 1), D, 4 * (D - 1), &err), UZ_OK);
     for (int64_t j = 0, at = 0; j < D; j++) {
-        qp.K.idx[j] = j;
+        qp.K.idx[j] = (int32_t)j;
         qp.K.val[j] = 1;
         qp.K.ptr[j + 1] = j + 1;
         for (int64_t i = j - 1; i <= j; i++)
             for (int64_t side = 0; i >= 0 && i < D - 1 && side < 2; side++, at++) {
-                qp.N.idx[at] = 2 * i + side;
+                qp.N.idx[at] = (int32_t)(2 * i + side);
                 qp.N.val[at] = (i == j) == (side == 0) ? 1 : -1;
             }
         qp.N.ptr[j + 1] = at;

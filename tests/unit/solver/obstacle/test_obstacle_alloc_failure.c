@@ -102,7 +102,8 @@ static void make_pairs(void)
 static void choose(void)
 {
     static const double h[] = {0, 1, 5};
-    static int64_t ptr[] = {0, 1, 3}, idx[] = {0, 1, 2};
+    static int64_t ptr[] = {0, 1, 3};
+    static int32_t idx[] = {0, 1, 2};
     static double val[] = {1, 2, 3};
     const uz_csc N = {.rows = 3, .cols = 2, .ptr = ptr, .idx = idx, .val = val};
     uz_candidates c;

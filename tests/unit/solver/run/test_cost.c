@@ -99,17 +99,18 @@ TEST(the_rate_of_k_is_measured_within_its_entries)
     const int64_t d = 4 * ENTRIES;
     const size_t bytes = ENTRIES * sizeof(double), page = 1 << 16;
     char *room = mmap(NULL, bytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    int64_t *ptr = calloc((size_t)d + 1, sizeof *ptr), *idx = malloc(ENTRIES * sizeof *idx);
+    int64_t *ptr = calloc((size_t)d + 1, sizeof *ptr);
+    int32_t *idx = malloc(ENTRIES * sizeof *idx);
     CHECK(room != MAP_FAILED && ptr && idx && mprotect(room + bytes, page, PROT_NONE) == 0);
     for (int64_t j = 0; j <= d; j++)
         ptr[j] = (j + 3) / 4;
-    for (int64_t k = 0; k < ENTRIES; k++)
+    for (int32_t k = 0; k < ENTRIES; k++)
         idx[k] = 4 * k;
     const uz_settings settings = uz_settings_default();
     uz_csc K = {.rows = d, .cols = d, .ptr = ptr, .idx = idx, .val = (double *)(void *)room}, N = {.rows = 0};
     CHECK(uz_csc_init(&N, 0, d, 0, NULL) == UZ_OK);
     CHECK(uz_cost_size_of(&K, &N, NULL, NULL, 0, 0, &settings).entry_s == 0);
-    for (int64_t k = 0; k < ENTRIES; k++) /* as many as rows: it is measured */
+    for (int32_t k = 0; k < ENTRIES; k++) /* as many as rows: it is measured */
         idx[k] = k;
     for (int64_t j = 0; j <= d; j++)
         ptr[j] = j < ENTRIES ? j : ENTRIES;

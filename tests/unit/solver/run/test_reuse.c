@@ -18,7 +18,7 @@ static void keep_rows(uz_qp *qp, bool (*keep)(int64_t row))
     for (int64_t j = 0, k = 0; j < qp->N.cols; j++) {
         for (; k < qp->N.ptr[j + 1]; k++)
             if (row[qp->N.idx[k]] >= 0) {
-                qp->N.idx[at] = row[qp->N.idx[k]];
+                qp->N.idx[at] = (int32_t)row[qp->N.idx[k]];
                 qp->N.val[at++] = qp->N.val[k];
             }
         qp->N.ptr[j + 1] = at;
