@@ -151,8 +151,6 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
     model->info.xyz = model->mesh.xyz;
     status = uz_take_materials(model, scene, err);
     if (status == UZ_OK)
-        status = uz_find_tied(model, scene, err);
-    if (status == UZ_OK)
         status = uz_number_dofs(model, scene, err);
     if (status == UZ_OK)
         status = uz_spread_springs(model, scene, err);

@@ -19,6 +19,7 @@ typedef struct {
     int64_t index;        /* its number in the scene, for pointers such as "/contacts/2/with" */
     const uz_group *on;   /* the surface that has the rows: once sites are found that of the slave */
     const uz_group *with; /* that of another body; NULL: an obstacle */
+    bool tie;             /* a tie's: nodes of rigid groups cannot be its slaves */
     double *room;         /* n_nodes, zero, and left zero */
     /* Contact at a displaced place: `model` has the nodes there, and this is the body before anything moves, with its
      * sites. What is chosen once (which side is the slave, what smooth surfaces are off their facets) is chosen there,
@@ -41,8 +42,7 @@ typedef struct {
 typedef struct {
     const char *name;
     int64_t (*places)(const uz_contact_input *in);
-    /* Once per body and place: fills the sites (zeroed), from which rows follow. On failure they are cleared by the
-     * caller. */
+    /* Once per body and place: fills the sites (zeroed), from which rows follow. On failure the caller clears them. */
     uz_status (*find)(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
     /* The row of a place, for the contact of this load; false: there is none, as at a hanging node. */
     bool (*row)(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place);

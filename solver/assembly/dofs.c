@@ -87,6 +87,8 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
         return status;
     status = uz_number_rigid(model, scene, err);
     if (status == UZ_OK)
+        status = uz_find_tied(model, scene, err);
+    if (status == UZ_OK)
         status = uz_number_tied(model, err);
     if (status != UZ_OK)
         return status;

@@ -313,6 +313,7 @@ typedef struct {
     double area, stiffness, away,
         middle[3];               /* the mean over its sides; away: of their middle, from that of all nodes */
     int64_t first, side, number; /* the lowest place and side of a zone, and its number */
+    bool rigid;                  /* of a tie: all of it is of rigid groups */
 } zone_mark;
 
 /* -1, 1; 0: the same but for rounding. */
@@ -321,13 +322,16 @@ static int compare_sizes(double x, double y)
     return fabs(x - y) <= ALIKE * fmax(fabs(x), fabs(y)) ? 0 : x < y ? -1 : 1;
 }
 
-/* The smaller one first, which ends on the other, then the softer, then the nearer to the middle of the mesh: what does
- * not depend on how nodes are numbered, nor on which of them is `on`, nor on the axes. Then the lowest nodes. */
+/* What can't follow is last; the smaller one first, which ends on the other, then the softer, then the nearer to the
+ * middle of the mesh: what does not depend on how nodes are numbered, nor on which of them is `on`, nor on the axes.
+ * Then the lowest nodes. */
 static int by_order(const void *a, const void *b)
 {
     const zone_mark *x = a, *y = b;
     const int area = compare_sizes(x->area, y->area), stiffness = compare_sizes(x->stiffness, y->stiffness),
               away = compare_sizes(x->away, y->away);
+    if (x->rigid != y->rigid)
+        return x->rigid ? 1 : -1;
     if (area || stiffness || away)
         return area ? area : stiffness ? stiffness : away;
     return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
@@ -354,7 +358,7 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
     for (int64_t i = 0; i < pair->surface.n; i++)
         itself = itself || pair->of[i] == (UZ_OF_ON | UZ_OF_WITH);
     for (int64_t z = 0; z < count; z++)
-        mark[z] = (zone_mark){.first = INT64_MAX, .side = INT64_MAX, .number = z};
+        mark[z] = (zone_mark){.first = INT64_MAX, .side = INT64_MAX, .number = z, .rigid = pair->in->tie};
     for (int64_t i = 0; i < pair->surface.n; i++) {
         const uz_mortar_side *side = &pair->surface.side[i];
         zone_mark *of = mark + zone[i];
@@ -362,8 +366,10 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
         of->stiffness += side->area * uz_most_stiffness(uz_element_material(model, side->face.element)->lame);
         for (int k = 0; k < side->nodes * dim; k++)
             of->middle[k % dim] += side->area * side->xyz[k] / side->nodes;
-        for (int a = 0; a < side->nodes; a++)
+        for (int a = 0; a < side->nodes; a++) {
             of->first = side->place[a] < of->first ? side->place[a] : of->first;
+            of->rigid = of->rigid && uz_is_rigid(model, side->node[a]);
+        }
         of->side = i < of->side ? i : of->side;
     }
     for (int64_t z = 0; z < count; z++) {

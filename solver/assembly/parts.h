@@ -21,7 +21,7 @@ uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err)
 uz_status uz_number_rigid(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* value (n_fixed): those of the prescribed motions. */
 void uz_rigid_values(double *value, const uz_body_model *model, const uz_scene *scene);
-/* mesh -> tied. UZ_ERR_SCENE: surfaces that are not near each other, nodes that would follow and be followed. */
+/* mesh, rigid -> tied. UZ_ERR_SCENE: surfaces that are not near each other, nodes that would follow and be followed. */
 uz_status uz_find_tied(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* tied, dof as the supports have it, rigid_of -> UZ_NO_DOF for what follows masters. */
 uz_status uz_number_tied(uz_body_model *model, uz_error *err);

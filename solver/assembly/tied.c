@@ -48,6 +48,7 @@ static uz_status find_sites(uz_contact_sites *sites, const uz_body_model *model,
     const uz_contact_input in = {.model = model,
                                  .contact = &contact,
                                  .index = k,
+                                 .tie = true,
                                  .on = uz_mesh_group(&model->mesh, tie->on, TIES, err),
                                  .with = uz_mesh_group(&model->mesh, tie->to, TIES, err)};
     if (!in.on || !in.with)

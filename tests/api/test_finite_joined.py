@@ -186,6 +186,56 @@ def test_what_is_tied_to_a_rigid_group_goes_with_it(s):
         check(off < 1e-8 and moved > 0.3, kind, turn, off, moved)
 
 
+def test_a_rigid_side_is_followed(s):
+    """A rigid block tied to a soft one that is as fine, whichever has the lower nodes, and the wider side: the same answer."""
+    for kind in ("quad4", "quad8", "hex8"):
+        solid = kind in SOLID
+        low, high = ("y0", "y1") if solid else ("bottom", "top")
+        for kinematics, cells in (("fixed", 2), ("fixed", 4), ("finite", 2), ("finite", 4)):
+            found = []
+            for soft, block in ((0, 1), (1, 0)):
+                places = [lambda x, y, *z: (8 * x, y - 1, *z), lambda x, y, *z: (2 + cells * x, y, *z)]
+                sizes = [(8, 2, 1)[:3 if solid else 2], (cells, 1, 1)[:3 if solid else 2]]
+                sizes, places = [sizes[soft], sizes[block]], [places[soft], places[block]]
+                request = body([kind] * 2, sizes, places, {"floor": [(soft, low)], "top": [(soft, high)], "base": [(block, low)]},
+                               model="solid" if solid else "plane_strain", kinematics=kinematics, materials=[MATERIAL if kinematics == "finite" else {**MATERIAL, "law": "linear"}],
+                               supports=[{"on": "floor", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, {"on": "block", "rigid": {"point": [3, 0.5, 0][:3 if solid else 2]}}],
+                               loads=[{"on": "base", "force": [0.02, -0.02, 0][:3 if solid else 2]}], ties=[{"on": "base", "to": "top"}])
+                first = block * math.prod(sizes[0])
+                request["problem"]["mesh"]["groups"]["block"] = {"elements": list(range(first, first + math.prod(sizes[block])))}
+                job = s.solved(request, "converged")
+                found.append(by_place(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements,nodes").json))
+            one, other = found
+            check(max(math.dist(one[at], other[at]) for at in one) < 1e-10 and max(math.hypot(*u) for u in one.values()) > 5e-3, kind, kinematics, cells)
+
+
+def test_what_a_wall_holds_of_a_tied_node_may_lean(s):
+    """A strip on a rigid block that turns, tied to it, whose tied end and one side slide along a wall: upright, by an axis, and leaning by
+    30 and by 200 degrees, by a normal."""
+    for kind, held in (("quad4", True), ("quad8", False), ("hex8", True)):
+        solid = kind in SOLID
+        cut = 3 if solid else 2
+        found = []
+        for lean in (0, 30, 200):
+            a, b = math.cos(math.radians(lean)), math.sin(math.radians(lean))
+            turned = lambda x, y, *z: [a * x - b * y, b * x + a * y, *z]
+            back = lambda x, y, *z: [a * x + b * y, a * y - b * x, *z]
+            places = [lambda x, y, *z: turned(x, 4 * y, *z), lambda x, y, *z: turned(x, y - 1, *z)]
+            low, high, side = ("y0", "y1", "x0") if solid else ("bottom", "top", "left")
+            way = turned(0, 0.3, 0)
+            rigid = {"ux": way[0], "uy": way[1], "rz": 12, **({"uz": 0, "rx": 0, "ry": 0} if solid else {})} if held else {}
+            wall = {"ux": 0} if lean == 0 else {"normal": turned(1, 0, 0)[:cut], "u": 0}
+            request = body([kind] * 2, [(2, 4, 1)[:cut], (2, 1, 1)[:cut]], places, {"foot": [(0, low)], "head": [(0, high)], "wall": [(0, side)], "base": [(1, high)]},
+                           model="solid" if solid else "plane_strain", kinematics="finite", materials=[MATERIAL],
+                           supports=[{"on": "block", "rigid": {"point": turned(0.5, -0.5, 0)[:cut], **rigid}}, {"on": "head", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})},
+                                     {"on": "wall", **wall}],
+                           loads=[] if held else [{"on": "base", "force": turned(0.02, 0.05, 0)[:cut]}], ties=[{"on": "foot", "to": "base"}])
+            request["problem"]["mesh"]["groups"]["block"] = {"elements": [8, 9]}
+            found.append([back(*u) for u in answer(s, request, forces=False)["displacements"]])
+        off = [max(map(math.dist, found[0], other)) for other in found[1:]]
+        check(max(off) < 1e-11 and max(math.hypot(*u) for u in found[0]) > 0.15, kind, off)
+
+
 # ---- meshes that are refined beside rigid groups
 
 def test_meshes_are_refined_beside_rigid_groups(s):
