@@ -286,6 +286,21 @@ def test_auto_refines_for_the_model_that_it_takes(s):
         check(one["nodes"] == other["nodes"] and farthest(one, other) < 1e-6 and "finite" in one["summary"], one["summary"])
 
 
+def test_told_errors_do_not_depend_on_how_a_body_stands(s):
+    """A strip that is bent by its end, as it is and with all of it turned by 90 degrees by its supports: the same meshes, and the same
+    error, to which distances of answers have been added."""
+    for kind in ("quad8", "tri6"):
+        found = []
+        for stand in (0, 90):
+            to = (9.2, 1.5) if stand == 0 else (-1.5, 9.2)
+            request = scene(mesh={"box": {"size": [10, 1], "cells": [10, 1], "element": kind}, "refine": "auto"},
+                            supports=[{"on": "left", "ux": 0, "uy": 0, "rotation": {"about": [0, 0.5], "angle": stand}},
+                                      {"on": "right", "ux": to[0] - 10, "uy": to[1], "rotation": {"about": [10, 0.5], "angle": stand + 20}}])
+            summary = answer(s, {**request, "solver": {"accuracy": {"total": 0.05}}}, forces=False)["summary"]
+            found.append((summary["problem"]["d"], summary["error"]["total"]))
+        check(found[0][0] == found[1][0] and abs(found[1][1] / found[0][1] - 1) < 1e-6, kind, found)
+
+
 # ---- forces at points of rigid groups
 
 def test_a_force_beside_a_rigid_side_is_one_on_a_rigid_block(s):
