@@ -10,8 +10,9 @@
  * r'z = s'(D'z + L'z).
  *
  * Rounding leads these steps away from the true residual. So that is computed in double precision each time that they
- * have reduced it by CARRIED, and the direction goes on from there (van der Vorst, Ye, SIAM J. Sci. Comput. 22 (2000)).
- * Where it is not as small as they have it K is too ill-conditioned for them. */
+ * have reduced it by CARRIED, and where they meet the goal, and the direction goes on from there (van der Vorst, Ye,
+ * SIAM J. Sci. Comput. 22 (2000)). Where it is not as small as they have it, or it takes more than STEPS_MOST of them,
+ * K is too ill-conditioned for them. */
 #include "worker.h"
 
 #include <math.h>
@@ -21,6 +22,8 @@
 #define CARRIED 1e-4
 /* The true one over what the steps have it for, which may be less than they can carry. */
 #define FAIR 1.5
+/* Steps to the next look at the true one, at most: rounding may keep these from ever coming so far. */
+enum { STEPS_MOST = 20 };
 
 /* Vectors as those of steps.c, in single precision and in their room. */
 typedef struct {
@@ -152,6 +155,7 @@ static void read_residual(spread_system *s, int which, rough *v)
     precondition(s, which, v);
     memcpy(s->known, s->square, sizeof s->known);
     s->rough = true;
+    s->since = 0;
 }
 
 void rough_begin(spread_system *s, int which)
@@ -203,12 +207,16 @@ int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2
     while (made < most && !*stuck && system_square(s) > goal2) {
         *stuck = !take_step(s, which, &v);
         made += !*stuck;
-        if (!*stuck && is_far(s)) {
+        if (*stuck)
+            break;
+        if (is_far(s) || system_square(s) <= goal2) {
             const double told = fmax(system_square(s), CARRIED * CARRIED * worse(s, s->known));
             system_settle(s);
             system_residual(s, which, false);
             read_residual(s, which, &v);
             *stuck = !(system_square(s) <= FAIR * FAIR * told);
+        } else {
+            *stuck = ++s->since >= STEPS_MOST;
         }
     }
     if (*stuck)

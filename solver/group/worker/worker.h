@@ -89,6 +89,7 @@ typedef struct {
     double square[LANES];          /* r'z */
     bool single;                   /* steps may be in single precision, */
     bool rough;                    /* and are: u, z and p are those of rough.c */
+    int since;                     /* steps since the last residual in double precision */
     float length[LANES];           /* of the last of these steps, which x there has not taken yet */
     double before[LANES];          /* square before it, */
     double known[LANES];           /* and of the last residual in double precision */
