@@ -380,7 +380,8 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
         mark[z].stiffness /= mark[z].area;
         for (int c = 0; c < dim; c++)
             mark[z].middle[c] /= mark[z].area;
-        mark[z].away = sqrt(uz_distance2(mark[z].middle, middle, dim));
+        /* of sides around the middle it is rounding, which is to decide nothing */
+        mark[z].away = model->mesh.extent + sqrt(uz_distance2(mark[z].middle, middle, dim));
     }
 }
 
