@@ -194,6 +194,17 @@ static bool is_translation(const uz_body_model *model, const double *nodal, doub
     return so;
 }
 
+/* Is node a of a rigid group other than the node that has its translation, or may the group turn? */
+static bool goes_along(const uz_body_model *model, int64_t a)
+{
+    const uz_rigid_group *group = uz_rigid_group_of(model, a);
+    const int dim = model->mesh.dim;
+    bool so = group && group->anchor[0] != a;
+    for (int c = 0; c < dim && group && group->anchor[1] >= 0; c++)
+        so = so || model->dof[group->anchor[1] * dim + c] >= 0;
+    return so;
+}
+
 bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large)
 {
     const int dim = model->mesh.dim;
@@ -203,7 +214,7 @@ bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large
         const double *u = nodal + a * dim, *x = model->mesh.xyz + a * dim;
         double way = 0, along = 0, length2 = 0, motion2 = 0;
         bool all = true;
-        if (uz_is_rigid(model, a) || uz_node_frame(model, a))
+        if ((uz_is_rigid(model, a) && !shifted) || goes_along(model, a) || uz_node_frame(model, a))
             continue;
         for (int c = 0; c < dim; c++) {
             const int64_t j = model->dof[a * dim + c];
@@ -220,12 +231,14 @@ bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large
         from = from ? from : x;
         for (int c = 0; c < dim; c++) { /* what the square of the distance to the first one grows by */
             const double d = x[c] - from[c], e = u[c] - whole[c];
-            way = fmax(way, fabs(u[c]));
+            way = fmax(way, fmax(fabs(u[c]), fabs(whole[c])));
             along += e * (2 * d + (large ? e : 0));
             length2 += d * d;
             motion2 += e * e;
         }
-        if (fabs(along) > 2 * APART * way * (sqrt(length2) + sqrt(motion2)))
+        const double length = sqrt(length2);
+        way += large ? length : 0; /* which is what a turn takes nodes to, less where they were */
+        if (fabs(along) > 2 * APART * way * (length + sqrt(motion2)))
             return true;
     }
     return false;

@@ -2,6 +2,7 @@
 mesh, and pictures. usage: test_whole_error.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
+import itertools
 import json
 import math
 import threading
@@ -100,8 +101,10 @@ def test_a_pressure_at_a_corner_has_no_limit(s):
 
 def test_what_is_stretched_and_carried_far_has_an_error(s):
     """It was told 0 where the stretch is less than 1e-12 of the way, as if it were rounding; what is given alike stays at 0."""
-    def told(way, by, kinematics, element):
+    def told(way, by, kinematics, element, rigid=False):
         ends = [{"on": "left", "ux": way, "uy": 0}, {"on": "right", "ux": way + by, "uy": 0}]
+        if rigid:
+            ends = [{"on": end["on"], "rigid": {"point": [0, 0], "ux": end["ux"], "uy": 0, "rz": 0}} for end in ends]
         scene = {"kind": "scene", "model": "plane_strain", "kinematics": kinematics, "mesh": {"box": {"size": [2, 1], "cells": [4, 2], "element": element}},
                  "materials": [{"on": "all", "young": 1, "poisson": 0.3, **({"law": "neo_hooke"} if kinematics == "finite" else {})}], "supports": ends}
         return solved(s, {"problem": scene})["summary"]["error"]["mesh"]
@@ -114,6 +117,24 @@ def test_what_is_stretched_and_carried_far_has_an_error(s):
             # most of it is rounding
             check(told(1e3, 1e-12, kinematics, element) > 0.2, kinematics, element)
             check(told(1e3, 0, kinematics, element) == 0, kinematics, element)
+        check(abs(told(1e3, 1e-9, kinematics, "quad4", True) / told(0, 1e-6, kinematics, "quad4") - 1) < 0.02, kinematics)
+        check(told(1e3, 0, kinematics, "quad4", True) == 0, kinematics)
+
+
+def test_what_is_held_at_two_nodes_and_turned_has_no_error(s):
+    """Whichever of them has the lower number. Where that turns about the other one, rounding of its way was held against that of the other,
+    which is 0, and the body was told an error of 0.45; of large deformation, of no number."""
+    for kinematics, swapped, angle in itertools.product(("fixed", "finite"), (False, True), (0.1, 0.23, 0.37)):
+        size = [1.7 + angle, 0.9]
+        pivot, other = ([0, 0], size) if swapped else (size, [0, 0])
+        x, y = (b - a for a, b in zip(pivot, other))
+        along, across = (math.cos(angle) - 1, math.sin(angle)) if kinematics == "finite" else (0, angle)
+        held = [{"on": {"where": {"x": pivot[0], "y": pivot[1]}}, "ux": 0, "uy": 0},
+                {"on": {"where": {"x": other[0], "y": other[1]}}, "ux": along * x - across * y, "uy": across * x + along * y}]
+        scene = {"kind": "scene", "model": "plane_strain", "kinematics": kinematics, "mesh": {"box": {"size": size, "cells": [8, 4]}},
+                 "materials": [{"on": "all", "young": 1, "poisson": 0.3, **({"law": "neo_hooke"} if kinematics == "finite" else {})}], "supports": held}
+        error = solved(s, {"problem": scene})["summary"]["error"]
+        check(error["mesh"] == 0, kinematics, swapped, angle, error)
 
 
 def labelled(kind, materials, young=lambda k: 1000):
