@@ -245,7 +245,7 @@ def test_meshes_are_refined_beside_rigid_groups(s):
         found = []
         for rigid in (False, True):
             point = [2, 0.5, 0.5][:3 if solid else 2]
-            to = {"ux": 0.1, "uy": 0.2, **({"uz": 0} if solid else {})}
+            to = {"ux": 0.1, "uy": 0.2, **({"uz": 0.05} if solid else {})}  # no image of itself: marks would go by rounding
             motion = {"rigid": {"point": point, **to, **({"rx": 0, "ry": 0} if solid else {}), "rz": 40}} if rigid else {**to, "rotation": {"about": point, "angle": 40, **({"axis": [0, 0, 1]} if solid else {})}}
             request = scene(model="solid" if solid else "plane_strain", supports=[{"on": "left", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, {"on": "right", **motion}],
                             mesh={"box": {"size": [2, 1, 1][:3 if solid else 2], "cells": [2, 1, 1][:3 if solid else 2], "element": kind}, "refine": "auto"})
@@ -329,7 +329,8 @@ def test_a_force_beside_a_rigid_side_is_one_on_a_rigid_block(s):
             pair = [one["summary"]["resultants"]["supports"][1]["rigid"][name] for one in found]
             check(math.dist(*pair) < 1e-6 * (1 + math.hypot(*pair[0])), solid, force, name, pair)
         check(found[0]["summary"]["finite"]["load"] == found[1]["summary"]["finite"]["load"] and
-              (outcome == "unstable" or found[1]["summary"]["finite"]["qps"] <= 1.2 * found[0]["summary"]["finite"]["qps"]),
+              (found[0]["summary"]["finite"]["shifted"] > 0 or  # rounding has a say in the way through tangents that are not definite
+               found[1]["summary"]["finite"]["qps"] <= 1.2 * found[0]["summary"]["finite"]["qps"]),
               [one["summary"]["finite"] for one in found])
         loads = [one["summary"]["resultants"]["loads"] for one in found]
         check(math.dist(loads[0]["force"], loads[1]["force"]) < 1e-9 and math.dist(loads[0]["moment"], loads[1]["moment"]) < 1e-6, loads)
