@@ -110,8 +110,8 @@ PHRASES = {
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,
     "Mathematical Programming Computation 4, 2012": None,
     "a block squeezed by 30 %": None,  # tests/peers/large.py
-    "| 102,000 | 2.6 | 2.6 to 2.9 | 1.0 + 1.4 | 1.0 to 1.1 |": None, "| 336,000 | 7.9 | 6.6 to 7.8 | 2.7 to 3.4 + 3.8 to 4.2 | 0.85 to 1.0 |": None,  # by hand, on two processors
-    "| 1,006,000 | 17.6 to 23.6 | 14.9 to 21.0 | 8.9 + 12.7 | 0.84 to 0.89 |": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
+    "| 108,000 | 1.4 | 1.5 to 2.2 | 2.0 to 2.7 | 1.1 to 1.6 |": None, "| 335,000 | 4.3 | 3.6 to 3.7 | 5.9 | 0.84 to 0.85 |": None,  # by hand, on two processors
+    "| 1,012,000 | 15.9 to 17.9 | 10.8 to 11.2 | 18.1 to 18.6 | 0.62 to 0.68 |": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
     "4,000 jobs of solids of 20 x 20 x 12 hex8 (93 MB each) over three daemons, nothing else on the machine: 98.8 % of the jobs that could hit did, by chance 80 %, and all of them took 0.47 of the time": None,  # tests/soak/daemons.py zipf 4000
     "(plane bodies of 16,000 dofs, solids of 5,000:": None,  # likewise
     # rules of the program
