@@ -45,12 +45,12 @@ bool uz_may_be_compared(const uz_scene *scene, int64_t d)
            (scene->kinematics == UZ_KINEMATICS_FINITE || scene->kinematics == UZ_KINEMATICS_AUTO);
 }
 
+/* Of an answer to the equations. */
 static bool is_asked(const uz_result *result, const uz_problem *one, bool own_laws)
 {
     const uz_summary *s = &result->summary;
     const uz_evaluation *e = result->evaluation;
-    if (one->kind != UZ_PROBLEM_SCENE || one->scene.kinematics != UZ_KINEMATICS_AUTO || s->outcome != UZ_CONVERGED ||
-        !e)
+    if (one->kind != UZ_PROBLEM_SCENE || one->scene.kinematics != UZ_KINEMATICS_AUTO || !e)
         return false;
     if (own_laws)
         return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
@@ -124,18 +124,25 @@ static uz_status refuse_free(const uz_result *small, const uz_error *own, uz_err
         own->message);
 }
 
+static uz_status solve_large(uz_result **large, const uz_result *small, const uz_problem *finite,
+                             const uz_settings *settings, const uz_hooks *hooks, double deadline, uz_error *err)
+{
+    uz_error own = {0};
+    const uz_status status = uz_solve_finite_load(large, finite, settings, hooks, deadline, small, NULL, &own);
+    if (status == UZ_ERR_FREE_BODY)
+        return refuse_free(small, &own, err);
+    if (status != UZ_OK && err)
+        *err = own;
+    return status;
+}
+
 static uz_status choose(uz_result **result, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
                         double deadline, uz_error *err)
 {
     uz_problem finite = *one;
     uz_result *large = NULL, *left;
-    uz_error own = {0};
     finite.scene.kinematics = UZ_KINEMATICS_FINITE;
-    const uz_status status = uz_solve_finite_load(&large, &finite, settings, hooks, deadline, *result, NULL, &own);
-    if (status == UZ_ERR_FREE_BODY)
-        return refuse_free(*result, &own, err);
-    if (status != UZ_OK && err)
-        *err = own;
+    const uz_status status = solve_large(&large, *result, &finite, settings, hooks, deadline, err);
     if (status != UZ_OK)
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;
@@ -152,7 +159,7 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
 {
     const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
     const double deadline = started + settings->time_limit_s;
-    if (!is_asked(*result, one, own_laws))
+    if ((*result)->summary.outcome != UZ_CONVERGED || !is_asked(*result, one, own_laws))
         return UZ_OK;
     if (own_laws)
         return choose(result, one, settings, hooks, deadline, err);
@@ -175,12 +182,9 @@ static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *resul
     uz_problem one = uz_problem_of_case(problem, i);
     uz_settings coarse = uz_settings_default();
     uz_result *large = NULL;
-    uz_error own = {0};
     const uz_outcome outcome = result->summary.outcome;
     /* what the mesh is short of says nothing of the model */
-    result->summary.outcome = outcome == UZ_MESH_LIMIT ? UZ_CONVERGED : outcome;
-    *compared = is_asked(result, &one, true);
-    result->summary.outcome = outcome;
+    *compared = (outcome == UZ_CONVERGED || outcome == UZ_MESH_LIMIT) && is_asked(result, &one, true);
     if (!*compared)
         return UZ_OK;
     one.scene.kinematics = UZ_KINEMATICS_FINITE;
@@ -188,14 +192,9 @@ static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *resul
     one.scene.n_bisected = result->grids->n_bisected;
     one.n_quantities = 0;
     coarse.relative_error = COMPARED_TO;
-    const uz_status status = uz_solve_finite_load(&large, &one, &coarse, hooks, deadline, result, NULL, &own);
-    if (status == UZ_ERR_FREE_BODY)
-        return refuse_free(result, &own, err);
-    if (status != UZ_OK) {
-        if (err)
-            *err = own;
+    const uz_status status = solve_large(&large, result, &one, &coarse, hooks, deadline, err);
+    if (status != UZ_OK)
         return status;
-    }
     *small = large->summary.small;
     count_both(&result->summary, &large->summary);
     uz_result_free(large);
