@@ -274,6 +274,8 @@ size_t uz_body_model_bytes(const uz_body_model *model);
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
  * Of large deformation without that, and without what follows the body: pressures and forces at points. */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* Whose nodes a load is on, of which one tells all (uz_check_finite_loads); NULL: no such. */
+const uz_rigid_group *uz_rigid_group_of_load(const uz_body_model *model, const uz_load *load);
 /* f += load i, a force at a point of a rigid group, of large deformation: it goes with the group, and its size and
  * direction stay, as does a moment in the plane. As forces on the nodes of the load's group where u has them, which
  * bear both. */

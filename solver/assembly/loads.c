@@ -162,6 +162,12 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
     return status;
 }
 
+const uz_rigid_group *uz_rigid_group_of_load(const uz_body_model *model, const uz_load *load)
+{
+    const uz_group *group = uz_mesh_group(&model->mesh, load->on, "", NULL);
+    return group ? uz_rigid_group_of(model, uz_group_node_at(group, 0)) : NULL;
+}
+
 uz_status uz_add_point_load(double *f, const uz_body_model *model, const uz_scene *scene, int64_t i, const double *u,
                             uz_error *err)
 {
@@ -171,8 +177,8 @@ uz_status uz_add_point_load(double *f, const uz_body_model *model, const uz_scen
     char where[96];
     snprintf(where, sizeof where, "/loads/%lld/on", (long long)i);
     const uz_group *group = uz_mesh_group(mesh, x.load->on, where, err);
-    const uz_rigid_group *rigid = group ? uz_rigid_group_of(model, uz_group_node_at(group, 0)) : NULL;
-    if (!rigid)
+    const uz_rigid_group *rigid = uz_rigid_group_of_load(model, x.load);
+    if (!group || !rigid)
         return UZ_ERR_SCENE;
     double point[3], *xyz = uz_alloc(n, sizeof *xyz), *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);
     uz_status status = xyz && share ? uz_spread_over_group(share, model, group, false, where, err)

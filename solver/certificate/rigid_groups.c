@@ -183,11 +183,10 @@ uz_status uz_rigid_groups_load(double *f, uz_body_model *tangent, const uz_finit
         const uz_load *load = &of->scene->loads[i];
         if (!load->has_point)
             continue;
-        const uz_group *on = uz_mesh_group(&of->model->mesh, load->on, "/loads", err);
-        const uz_rigid_group *group = on ? uz_rigid_group_of(of->model, uz_group_node_at(on, 0)) : NULL;
+        const uz_rigid_group *group = uz_rigid_group_of_load(of->model, load);
         group_at at;
         if (!group)
-            return UZ_ERR_SCENE;
+            return uz_fail(err, UZ_ERR_SCENE, "/loads", "\"%.63s\" is no rigid group", load->on);
         find_group(&at, of, group);
         add_point(f, tangent, &at, load);
     }

@@ -141,8 +141,7 @@ static uz_status turn_point(uz_body_model *tangent, const uz_scene *scene, int64
     uz_status status = f ? uz_add_point_load(f, tangent, scene, i, u, err)
                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
     if (status == UZ_OK) {
-        const uz_rigid_group *group =
-            uz_rigid_group_of(tangent, uz_group_node_at(uz_mesh_group(mesh, scene->loads[i].on, "", NULL), 0));
+        const uz_rigid_group *group = uz_rigid_group_of_load(tangent, &scene->loads[i]);
         uz_rigid_place(t, R, tangent, group, u);
         uz_rigid_point(at, tangent, group, scene->loads[i].point, u);
         for (int c = 0; c < 3; c++) {

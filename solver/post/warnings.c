@@ -223,8 +223,7 @@ static void look_at_small_only(const doubts *d)
         what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
     for (int64_t k = 0; k < d->scene->n_loads; k++) {
         const uz_load *load = &d->scene->loads[k];
-        const uz_group *group = load->has_point ? uz_mesh_group(&d->model->mesh, load->on, "", NULL) : NULL;
-        if (group && !uz_is_rigid(d->model, uz_group_node_at(group, 0)))
+        if (load->has_point && !uz_rigid_group_of_load(d->model, load))
             what = "forces at a point";
     }
     if (what && d->out->nonlinear > UZ_MOST_SLIDING)
