@@ -329,12 +329,13 @@ void uz_push_nodes(double *f, const uz_body_model *model, const double *force)
         const uz_inner_place *inner = uz_row_inner(model, i);
         const uz_contact_sites *sites = &model->sites[model->info.contact_of[i]];
         const double *normal = model->info.contact_normal + dim * i;
-        const int64_t place = model->row_place[i],
-                      masters = model->info.contact_face[2 * i] < 0 ? 0 : sites->first[place];
+        const int64_t place = model->row_place[i];
         for (int p = 0; p < dim * (inner ? inner->nodes : 1); p++)
             f[dim * (inner ? inner->node[p / dim] : model->info.contact_node[i]) + p % dim] +=
                 (inner ? inner->share[p / dim] : 1) * force[i] * normal[p % dim];
-        for (int64_t q = masters; model->info.contact_face[2 * i] >= 0 && q < sites->first[place + 1]; q++)
+        if (model->info.contact_face[2 * i] < 0)
+            continue;
+        for (int64_t q = sites->first[place]; q < sites->first[place + 1]; q++)
             for (int c = 0; c < dim; c++)
                 f[dim * sites->node[q] + c] -= sites->weight[q] * force[i] * normal[c];
     }

@@ -241,19 +241,15 @@ void uz_rigid_part(double at[3], const uz_body_model *model, int64_t a, const do
 static void follow_masters(double *u, const uz_body_model *model, int64_t a)
 {
     const int dim = model->mesh.dim;
-    double way[3] = {0};
+    double way[3] = {0}, there[3], own[3];
     for (int c = 0; c < dim; c++)
         way[c] = uz_tied_value(model, a, u + c, dim);
-    if (uz_node_frame(model, a)) {
-        for (int c = 0; c < dim; c++)
-            way[c] -= u[a * dim + c];
-        uz_tied_part(way, model, a);
-        for (int c = 0; c < dim; c++)
-            way[c] += u[a * dim + c];
-    }
+    uz_to_frame(there, model, a, way);
+    uz_to_frame(own, model, a, u + a * dim);
     for (int c = 0; c < dim; c++)
-        if (uz_node_frame(model, a) || model->dof[a * dim + c] == UZ_NO_DOF)
-            u[a * dim + c] = way[c];
+        own[c] = model->dof[a * dim + c] == UZ_NO_DOF ? there[c] : own[c];
+    uz_from_frame(own, model, a);
+    memcpy(u + a * dim, own, (size_t)dim * sizeof *u);
 }
 
 /* What hangs amid others, or is tied to them, where it may follow rigid groups. */
