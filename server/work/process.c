@@ -173,9 +173,9 @@ int process_reap(process *p, bool *out_of_memory)
 
 uint64_t process_body(const char *text, size_t len)
 {
-    static const char *const OTHER[] = {"loads", "p", "h", "N", "contacts", "candidates", "kinematics"};
-    uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
-    size_t begin = 0, end = 0;           /* of the last string */
+    static const char *const OTHER[] = {"loads", "p", "h", "N", "contacts", "candidates", "kinematics", "units"};
+    uint64_t hash = 0xcbf29ce484222325u, before = hash; /* FNV-1a, and before the last string began */
+    size_t begin = 0, end = 0;                          /* of the last string */
     int depth = 0;
     bool within = false, quoted = false, passed = false;
     for (size_t i = 0; i < len; i++) {
@@ -187,6 +187,7 @@ uint64_t process_body(const char *text, size_t len)
         } else if (c == '"') {
             quoted = true;
             begin = i + 1;
+            before = hash;
         } else if (c == '{' || c == '[') {
             depth++;
         } else if (c == '}' || c == ']') {
@@ -194,12 +195,14 @@ uint64_t process_body(const char *text, size_t len)
         } else if (c == ',' && depth <= 2) {
             passed = false;
             within = within && depth > 1;
+            continue; /* between members: whether one of OTHER is there at all makes no difference */
         } else if (c == ':' && depth == 1) {
             within = end - begin == 7 && memcmp(text + begin, "problem", 7) == 0;
         } else if (c == ':' && depth == 2 && within) {
             for (size_t k = 0; k < sizeof OTHER / sizeof OTHER[0]; k++)
                 passed =
                     passed || (end - begin == strlen(OTHER[k]) && memcmp(text + begin, OTHER[k], end - begin) == 0);
+            hash = passed ? before : hash;
         } else if (c == ' ' || c == '\n' || c == '\t' || c == '\r') {
             continue;
         }

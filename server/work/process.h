@@ -50,7 +50,7 @@ void process_kill(process *p);
 int process_reap(process *p, bool *out_of_memory);
 
 /* What stands for the body of a job's text: the same for texts whose problems differ only in
- * what leaves its stiffness as it is: loads, obstacles, how contact moves. */
+ * what leaves its stiffness as it is: loads, obstacles, how contact moves, names of units. */
 uint64_t process_body(const char *text, size_t len);
 
 #endif

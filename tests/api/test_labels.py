@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
+import time
 
-from service import MATRICES, SCENE, check, expect, main
+from service import ENDLESS, MATRICES, SCENE, check, expect, main
 
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 
 MM = {**SCENE["problem"], "units": {"length": "mm", "force": "N"}}
+
+OTHER = {"problem": {**SCENE["problem"], "thickness": 7}}
 
 
 def names_of(s, query):
@@ -61,6 +64,17 @@ def test_units_are_said_and_change_nothing(s):
                       ({"length": "mm", "force": "N", "stress": "Pa"}, "/problem/units/stress")):
         reply = s.post({"problem": {**MM, "units": wrong}})
         check(reply.status == 422 and reply.json["pointer"] == at, wrong, reply.json)
+
+
+def test_a_body_is_known_whatever_its_units_are_called(s):
+    """By the text alone, before anything of it is read: it goes to the process that has its factor, not to the first that is free."""
+    blocker = expect(s.post(ENDLESS), 202).json["id"]  # takes the first process
+    s.wait_status(blocker, "running")
+    s.solve(OTHER)
+    expect(s.request("DELETE", f"/v1/jobs/{blocker}"), 200)
+    s.wait_status(blocker, "dismissed")
+    time.sleep(0.5)  # its process is let go
+    check(s.solve({"problem": {**OTHER["problem"], "units": MM["units"]}})["summary"]["factor"]["cached"], "names of units made it another body")
 
 
 def test_the_client_says_both(s):
