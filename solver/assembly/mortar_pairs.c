@@ -313,7 +313,8 @@ typedef struct {
     double area, stiffness, away,
         middle[3];               /* the mean over its sides; away: of their middle, from that of all nodes */
     int64_t first, side, number; /* the lowest place and side of a zone, and its number */
-    bool rigid;                  /* of a tie: all of it is of rigid groups */
+    int64_t held, dofs;          /* of its sides' nodes, those of rigid groups being held */
+    bool bound;                  /* of a tie: most of it is held, and can't follow */
 } zone_mark;
 
 /* -1, 1; 0: the same but for rounding. */
@@ -330,8 +331,8 @@ static int by_order(const void *a, const void *b)
     const zone_mark *x = a, *y = b;
     const int area = compare_sizes(x->area, y->area), stiffness = compare_sizes(x->stiffness, y->stiffness),
               away = compare_sizes(x->away, y->away);
-    if (x->rigid != y->rigid)
-        return x->rigid ? 1 : -1;
+    if (x->bound != y->bound)
+        return x->bound ? 1 : -1;
     if (area || stiffness || away)
         return area ? area : stiffness ? stiffness : away;
     return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
@@ -358,7 +359,7 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
     for (int64_t i = 0; i < pair->surface.n; i++)
         itself = itself || pair->of[i] == (UZ_OF_ON | UZ_OF_WITH);
     for (int64_t z = 0; z < count; z++)
-        mark[z] = (zone_mark){.first = INT64_MAX, .side = INT64_MAX, .number = z, .rigid = pair->in->tie};
+        mark[z] = (zone_mark){.first = INT64_MAX, .side = INT64_MAX, .number = z};
     for (int64_t i = 0; i < pair->surface.n; i++) {
         const uz_mortar_side *side = &pair->surface.side[i];
         zone_mark *of = mark + zone[i];
@@ -368,11 +369,14 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
             of->middle[k % dim] += side->area * side->xyz[k] / side->nodes;
         for (int a = 0; a < side->nodes; a++) {
             of->first = side->place[a] < of->first ? side->place[a] : of->first;
-            of->rigid = of->rigid && uz_is_rigid(model, side->node[a]);
+            of->dofs += dim;
+            for (int c = 0; c < dim; c++)
+                of->held += model->dof[side->node[a] * dim + c] < 0 || uz_is_rigid(model, side->node[a]);
         }
         of->side = i < of->side ? i : of->side;
     }
     for (int64_t z = 0; z < count; z++) {
+        mark[z].bound = pair->in->tie && 2 * mark[z].held > mark[z].dofs;
         if (itself) {
             mark[z].area = mark[z].stiffness = 0;
             continue;
@@ -385,8 +389,8 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
     }
 }
 
-/* Zones are numbered by their order. False: no memory. */
-static bool order_zones(int64_t *zone, int64_t count, const uz_mortar_pair *pair)
+/* Zones are numbered by their order. bound: of each, as of its mark. False: no memory. */
+static bool order_zones(int64_t *zone, bool *bound, int64_t count, const uz_mortar_pair *pair)
 {
     zone_mark *mark = uz_alloc(count, sizeof *mark);
     int64_t *number = uz_alloc(count, sizeof *number);
@@ -395,8 +399,10 @@ static bool order_zones(int64_t *zone, int64_t count, const uz_mortar_pair *pair
         measure_zones(mark, count, zone, pair);
         qsort(mark, (size_t)count, sizeof *mark, by_order);
     }
-    for (int64_t z = 0; z < count && room; z++)
+    for (int64_t z = 0; z < count && room; z++) {
         number[mark[z].number] = z;
+        bound[z] = mark[z].bound;
+    }
     for (int64_t i = 0; i < pair->surface.n && room; i++)
         zone[i] = number[zone[i]];
     free(mark);
@@ -489,9 +495,10 @@ static double size_of(const uz_mesh *mesh)
     return 2 * sqrt(most);
 }
 
-/* The finer of two zones where they face each other is the slave. Looked at only where the two are hardly farther from
- * each other than at their nearest: what is farther away touches late or never, however fine it is. */
-static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_zones)
+/* The finer of two zones where they face each other is the slave, unless it alone is bound. Looked at only where the
+ * two are hardly farther from each other than at their nearest: what is farther away touches late or never, however
+ * fine it is. */
+static bool rank_zones(uz_contact_sites *sites, const bool *bound, uz_mortar_pair *pair, int64_t n_zones)
 {
     sample *s = NULL;
     const int64_t n = take_samples(&s, pair, sites->zone, n_zones);
@@ -511,7 +518,8 @@ static bool rank_zones(uz_contact_sites *sites, uz_mortar_pair *pair, int64_t n_
         for (int64_t k = first; k < end; k++)
             for (int j = 0; j < 2 && s[k].from_hi == from_hi && s[k].gap <= most; j++)
                 fine[j] += s[k].fine[j];
-        const bool hi = fine[1] > (1 + ALIKE) * fine[0];
+        const bool lo_bound = bound[s[first].lo], hi_bound = bound[s[first].hi];
+        const bool hi = lo_bound != hi_bound ? lo_bound : fine[1] > (1 + ALIKE) * fine[0];
         sites->rank[2 * sites->n_ranks] = hi ? s[first].hi : s[first].lo;
         sites->rank[2 * sites->n_ranks++ + 1] = hi ? s[first].lo : s[first].hi;
     }
@@ -661,8 +669,10 @@ uz_status uz_mortar_choose_slaves(uz_contact_sites *sites, uz_mortar_pair *pair,
     if (!before) {
         pair->rough = true;
         int64_t n_zones = number_zones(sites->zone, pair);
-        const bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair) &&
-                          order_zones(sites->zone, n_zones, pair) && rank_zones(sites, pair, n_zones);
+        bool good = n_zones >= 0 && divide_zones(sites->zone, &n_zones, pair);
+        bool *bound = good ? uz_alloc(n_zones, sizeof *bound) : NULL;
+        good = bound && order_zones(sites->zone, bound, n_zones, pair) && rank_zones(sites, bound, pair, n_zones);
+        free(bound);
         sites->n_zones = n_zones;
         pair->rough = false;
         return good ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);

@@ -182,6 +182,33 @@ def test_a_gap_within_the_tolerance(s):
     answer(s, far)
 
 
+def test_what_is_bound_is_followed_however_fine(s):
+    """The finer side of a rigid head, or one that is held itself, leads the coarser one: as if that were of the head, or held. Such ties were
+    refused, or ended as not_positive_definite."""
+    for kind in ("quad4", "tri6", "hex8"):
+        solid = kind in SOLID
+        n, cells = {"ux": 0, "uy": 0, **({"uz": 0} if solid else {})}, [(2,) * (3 if solid else 2), (5,) * (3 if solid else 2)]
+        rigid = {"rigid": {"point": [0.5, 0.5, 1] if solid else [0.5, 1], **({"uz": 0.1, "ux": 0.02, "uy": 0, "rx": 0, "ry": 2, "rz": 1} if solid else {"ux": 0.02, "uy": 0.1, "rz": 2})}}
+        for kinematics in ("fixed", "finite"):
+            law = {"law": "neo_hooke"} if kinematics == "finite" else {}
+            more = {"kinematics": kinematics, "materials": [{"on": "all", "young": E, "poisson": NU, **law}], "cells": cells}
+            tied = stacked((kind, kind), supports=[{"on": "foot", **n}, {"on": "upper", **rigid}], **more)
+            groups, pieces = tied["problem"]["mesh"]["groups"], len(tied["problem"]["mesh"]["elements"][kind]) // (math.prod(cells[0]) + math.prod(cells[1]))
+            groups["upper"] = {"elements": list(range(pieces * math.prod(cells[0]), pieces * (math.prod(cells[0]) + math.prod(cells[1]))))}
+            own = stacked((kind, kind), supports=[{"on": "foot", **n}, {"on": "roof", **rigid}, {"on": "floor", **n}], ties=[], **more)
+            check_same(*(answer(s, one) for one in (tied, own)), lambda x: x[-1] < 1 - 1e-9)
+            pull = [{"on": "foot", "traction": [10, *[0] * (1 + solid)]}]
+            tied = stacked((kind, kind), supports=[{"on": "floor", **n}], loads=pull, **more)
+            own = stacked((kind, kind), supports=[{"on": "floor", **n}, {"on": "roof", **n}], loads=pull, ties=[], **more)
+            check_same(*(answer(s, one) for one in (tied, own)), lambda x: x[-1] < 1 - 1e-9)
+
+
+def check_same(one, other, where):
+    most = max(math.hypot(*u) for x, u in zip(one["nodes"], one["displacements"]) if where(x))
+    off = max(math.dist(u, v) for x, u, v in zip(one["nodes"], one["displacements"], other["displacements"]) if where(x))
+    check(off < 1e-7 * most and most > 0, off, most)
+
+
 def test_refusals(s):
     refused(s, pulled(["quad4", "quad4"], ties=[{"on": "roof", "to": "wall"}]), "/ties/0/to", "wall")
     loose = pulled(["quad4", "quad4"])
