@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "run/problem.h"
+#include "run/results.h"
 #include "run/settings.h"
 #include "run/solve.h"
 #include "scene/scene.h"
@@ -45,17 +46,11 @@ bool uz_is_finite(const uz_problem *problem)
 
 uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
-    if (problem->scene.box.automatic && problem->scene.source == UZ_MESH_BOX)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
-                       "cells are chosen by the error of small deformation; give their numbers where kinematics are "
-                       "finite");
-    const bool refines = problem->scene.refine;
-    if (settings->guaranteed || settings->quantity_error > 0 ||
-        (!refines && (settings->total_error > 0 || settings->balanced)))
+    if (settings->guaranteed || (!uz_is_mesh_chosen(problem) && (settings->total_error > 0 || settings->balanced)))
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
-                       "where kinematics are finite the error of the mesh is told by estimate, but not bounded, and a "
-                       "mesh is refined by that of the whole: leave guaranteed out, ask for quantities beside the "
-                       "problem and for a relative_error of the equations, or refine the mesh");
+                       "where kinematics are finite the error of the mesh is told by estimate, but not bounded: leave "
+                       "guaranteed out, and ask for a quantity or for a relative_error of the equations, or refine "
+                       "the mesh");
     if (settings->stopping == UZ_STOP_PAPER)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
                        "finite kinematics end by their certificate; leave stopping out");
@@ -563,7 +558,16 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
 {
     (void)starts; /* where small deformation has got to says nothing of it */
     (void)cache;  /* tangents are those of one answer */
-    return uz_solve_finite_near(results, problem, settings, NULL, hooks, err);
+    uz_status status = uz_check_settings(settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(problem, err);
+    if (status == UZ_OK)
+        status = uz_check_finite_settings(problem, settings, err);
+    if (status == UZ_OK)
+        status = uz_solve_finite_near(results, problem, settings, NULL, hooks, err);
+    for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1) && status == UZ_OK; i++)
+        uz_judge_quantity(results[i]);
+    return status;
 }
 
 uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, const uz_settings *settings,
@@ -571,14 +575,8 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
-    uz_status status = uz_check_settings(settings, err);
-    if (status == UZ_OK)
-        status = uz_check_problem(problem, err);
-    if (status == UZ_OK)
-        status = uz_check_finite_settings(problem, settings, err);
     uz_finite_point **points = uz_alloc_zero(n, sizeof *points);
-    if (status == UZ_OK && !points)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld load cases", (long long)n);
+    uz_status status = points ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld load cases", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         if (uz_cancelled(hooks)) {
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");

@@ -22,6 +22,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "finite/mesh_error.h"
 #include "methods/milestones.h"
 #include "post/trend.h"
 #include "run/finite.h"
@@ -30,7 +31,9 @@
 #include "run/results.h"
 #include "run/settings.h"
 #include "run/transfer.h"
+#include "scene/check.h"
 #include "scene/grids.h"
+#include "scene/scene.h"
 #include "scene/subdivide.h"
 
 #include <math.h>
@@ -155,7 +158,8 @@ uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem,
     grid next = {.box = scene->box};
     uz_status status = check(&g, starts, err);
     if (status == UZ_OK && chosen) {
-        g.grids = uz_grids_of_box(&scene->box, MOST_DOFS);
+        const bool limited = scene->model == UZ_SOLID && uz_may_be_finite(scene);
+        g.grids = uz_grids_of_box(&scene->box, limited ? UZ_MOST_FINITE_DOFS : MOST_DOFS);
         g.grids.order *= settings->quantity_error > 0.0 ? 2 : 1; /* of a product of two errors in the energy norm */
         next = (grid){.box = uz_grid(&g.grids, g.grids.first), .n = g.grids.first};
     }
@@ -500,17 +504,24 @@ static uz_status solve_small(uz_result **results, const search *g, const uz_prob
 
 /* Of large deformation, from the displacements of the best answers so far. */
 static uz_status solve_large(uz_result **results, const search *g, const uz_problem *problem,
-                             const uz_settings *settings, const uz_mesh *mesh, uz_error *err)
+                             const uz_settings *settings, const uz_body_model *body, uz_error *err)
 {
+    const uz_mesh *mesh = &body->mesh;
     double **near = uz_alloc_zero(g->n_cases, sizeof *near);
     bool room = near;
     for (int64_t i = 0; room && g->best.results && i < g->n_cases; i++) {
         const uz_result *best = g->best.results[i];
         if (best->summary.finite.load >= 1)
-            room = (near[i] = uz_carry_nodal(mesh, best->u, best->n_nodes, mesh->dim));
+            room = (near[i] = g->refines ? uz_carry_nodal(mesh, best->u, best->n_nodes, mesh->dim)
+                                         : uz_carry_box(mesh, &g->best.on.box, best->u));
     }
-    const uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, g->hooks, err)
-                                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, g->hooks, err)
+                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    for (int64_t i = 0; i < g->n_cases && status == UZ_OK; i++) { /* on one mesh an answer stays without its estimate */
+        double *error = &results[i]->summary.discretization_error;
+        if (results[i]->summary.finite.load > 0 && isnan(*error))
+            status = uz_finite_mesh_error(error, NULL, body, results[i]->free_strain, results[i]->u, err);
+    }
     for (int64_t i = 0; near && i < g->n_cases; i++)
         free(near[i]);
     free(near);
@@ -528,7 +539,7 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
     settings.time_limit_s = fmax(0.0, g->deadline - started);
     if (!(x->results = uz_alloc_zero(g->n_cases, sizeof(uz_result *))))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
-    uz_status status = uz_is_finite(problem) ? solve_large(x->results, g, problem, &settings, &outline->mesh, err)
+    uz_status status = uz_is_finite(problem) ? solve_large(x->results, g, problem, &settings, outline, err)
                                              : solve_small(x->results, g, problem, &settings, outline, started, err);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;

@@ -175,6 +175,13 @@ uz_scene uz_scene_of_case(const uz_problem *problem, int64_t i)
     return scene;
 }
 
+bool uz_is_mesh_chosen(const uz_problem *problem)
+{
+    const uz_scene *scene = &problem->scene;
+    return problem->kind == UZ_PROBLEM_SCENE &&
+           (scene->refine || (scene->source == UZ_MESH_BOX && scene->box.automatic));
+}
+
 uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i)
 {
     uz_problem one = *problem;

@@ -18,6 +18,9 @@ uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i);
  * list (uz_load_case.surplus). Pointers too long are cut. err may be NULL. */
 void uz_error_name_case(uz_error *err, const uz_problem *problem, int64_t i);
 
+/* Are the cells of a box, or the elements to be bisected, chosen by the error asked for? */
+bool uz_is_mesh_chosen(const uz_problem *problem);
+
 /* The case that case i is after; -1: there is none of that name before it. */
 int64_t uz_case_before(const uz_problem *problem, int64_t i);
 

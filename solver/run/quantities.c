@@ -616,7 +616,8 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         if (!out->why[0] && why_none(&x))
             snprintf(out->why, sizeof out->why, "%s", why_none(&x));
         /* an interval has to wait for a finer mesh, and where that is to be finer its adjoint tells */
-        if (status == UZ_OK && (!out->why[0] || (coarse && work->dual && steers(&x, out))))
+        const bool solvable = place ? !place->why : work->dual != NULL;
+        if (status == UZ_OK && (!out->why[0] || (coarse && solvable && steers(&x, out))))
             status = estimate(out, &x, &of, err);
         uz_functional_clear(&of);
         e->n_quantities = i + 1;

@@ -13,14 +13,6 @@
 #include "run/finite.h"
 #include "run/problem.h"
 
-/* Are the cells of a box, or the elements to be bisected, chosen by the error asked for? */
-static bool is_mesh_chosen(const uz_problem *problem)
-{
-    const uz_scene *scene = &problem->scene;
-    return problem->kind == UZ_PROBLEM_SCENE &&
-           (scene->refine || (scene->source == UZ_MESH_BOX && scene->box.automatic));
-}
-
 /* The kinds of runs. The first that is one for the problem takes it; results as those of uz_solve_rounds. */
 typedef struct {
     bool (*takes)(const uz_problem *problem);
@@ -53,7 +45,7 @@ uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const u
 }
 
 static const run_kind KINDS[] = {{uz_is_weighed, uz_solve_weighed},
-                                 {is_mesh_chosen, uz_solve_grid_sequence},
+                                 {uz_is_mesh_chosen, uz_solve_grid_sequence},
                                  {uz_is_finite, uz_solve_finite},
                                  {any, uz_solve_given}};
 

@@ -11,25 +11,43 @@
 /* Weights below this are rounding. */
 #define NO_WEIGHT 1e-9
 
-/* The pressure of one contact at the nodes of the coarse mesh, and of one that is refined from it also at its new ones.
- * Grids of a box: the coarse one's lattice. */
+/* What is known at the nodes of the coarse mesh, and of one that is refined from it also at its new ones. Grids of a
+ * box: the coarse one's lattice. */
 typedef struct {
     const uz_box *box;   /* NULL: ... */
     const uz_mesh *fine; /* ... refined by bisection */
     uz_box_lattice lattice;
+    int step; /* in the lattice, between points of the lines */
     double *line[3];
-    double *pressure; /* nodes of the coarse mesh, or the fine one */
+    double *pressure; /* of one contact, at nodes of the coarse mesh, or the fine one */
 } field;
 
-/* Linear along each axis between the nodes of the lattice. */
-static double pressure_at(const field *f, const double *x)
+/* Of a box's grid, with points at every node along its edges, or at corners of cells alone. False: no memory. */
+static bool lay_lines(field *f, int points)
+{
+    bool room = true;
+    f->lattice = uz_box_lattice_of(f->box);
+    f->step = f->lattice.order / points;
+    for (int axis = 0; axis < f->box->dim; axis++)
+        room = (f->line[axis] = uz_box_lines(f->box, axis, points)) && room;
+    return room;
+}
+
+static void clear_lines(field *f)
+{
+    for (int axis = 0; axis < 3; axis++)
+        free(f->line[axis]);
+}
+
+/* Linear along each axis between the points of the lines. value: of node i at [stride * i]. */
+static double value_at(const field *f, const double *x, const double *value, int stride)
 {
     const int dim = f->box->dim;
     int64_t low[3] = {0};
     double share[3] = {0}, sum = 0.0;
-    for (int axis = 0; axis < dim; axis++) { /* the lattice's cell that x lies in, and where in it, 0 to 1 */
+    for (int axis = 0; axis < dim; axis++) { /* the lines' cell that x lies in, and where in it, 0 to 1 */
         const double *line = f->line[axis];
-        int64_t high = f->lattice.order * f->box->cells[axis];
+        int64_t high = f->lattice.order / f->step * f->box->cells[axis];
         while (high - low[axis] > 1) {
             const int64_t middle = low[axis] + (high - low[axis]) / 2;
             if (line[middle] <= x[axis])
@@ -45,12 +63,12 @@ static double pressure_at(const field *f, const double *x)
         double weight = 1.0;
         for (int axis = 0; axis < dim; axis++) {
             const int up = corner >> axis & 1;
-            at[axis] = low[axis] + up;
+            at[axis] = f->step * (low[axis] + up);
             weight *= up ? share[axis] : 1.0 - share[axis];
         }
         const int64_t node = weight > NO_WEIGHT ? uz_box_node(&f->lattice, at) : -1;
         if (node >= 0)
-            sum += weight * f->pressure[node];
+            sum += weight * value[stride * node];
     }
     return sum;
 }
@@ -77,13 +95,10 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
     if (!known)
         return UZ_OK;
     field f = {.box = coarse, .fine = coarse ? NULL : &fine->mesh};
-    if (coarse)
-        f.lattice = uz_box_lattice_of(coarse);
     uz_state *state = uz_alloc_zero(1, sizeof *state);
     f.pressure = uz_alloc_zero(coarse ? result->n_nodes : rows->n_nodes, sizeof *f.pressure);
     bool room = state && f.pressure && (state->r = uz_alloc(m, sizeof *state->r));
-    for (int axis = 0; coarse && axis < coarse->dim; axis++)
-        room = (f.line[axis] = uz_box_lines(coarse, axis, f.lattice.order)) && room;
+    room = (!coarse || lay_lines(&f, uz_box_lattice_of(coarse).order)) && room;
     int64_t contact = -1;
     for (int64_t i = 0; room && i < m; i++) { /* rows come contact by contact */
         if (rows->contact_of[i] != contact) {
@@ -92,11 +107,10 @@ uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_bo
             spread(&f, result, contact, true);
         }
         const int64_t node = rows->contact_node[i];
-        const double pressure = coarse ? pressure_at(&f, rows->xyz + node * rows->dim) : f.pressure[node];
+        const double pressure = coarse ? value_at(&f, rows->xyz + node * rows->dim, f.pressure, 1) : f.pressure[node];
         state->r[i] = -pressure * rows->contact_area[i];
     }
-    for (int axis = 0; axis < 3; axis++)
-        free(f.line[axis]);
+    clear_lines(&f);
     free(f.pressure);
     if (!room) {
         uz_state_free(state);
@@ -179,5 +193,16 @@ double *uz_carry_nodal(const uz_mesh *finer, const double *value, int64_t n_node
     for (int64_t i = n_nodes; out && i < finer->n_nodes; i++)
         for (int c = 0; c < stride; c++)
             out[i * stride + c] = uz_mesh_value_amid(finer, i, out + c, stride);
+    return out;
+}
+
+double *uz_carry_box(const uz_mesh *to, const uz_box *from, const double *u)
+{
+    field f = {.box = from};
+    const int dim = to->dim;
+    double *out = lay_lines(&f, 1) ? uz_alloc(to->n_nodes * dim, sizeof *out) : NULL;
+    for (int64_t i = 0; i < to->n_nodes * dim && out; i++)
+        out[i] = value_at(&f, to->xyz + i / dim * dim, u + i % dim, dim);
+    clear_lines(&f);
     return out;
 }

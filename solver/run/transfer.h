@@ -20,5 +20,8 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
 
 /* What is by nodes, n_nodes x stride, at those of a mesh that is refined from theirs. NULL: no memory. */
 double *uz_carry_nodal(const uz_mesh *finer, const double *value, int64_t n_nodes, int stride);
+/* Displacements u of the nodes of box `from`, at those of another mesh of the same box: linear along each axis between
+ * the corners of its cells. NULL: no memory. The caller frees it. */
+double *uz_carry_box(const uz_mesh *to, const uz_box *from, const double *u);
 
 #endif

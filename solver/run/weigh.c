@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "post/balance.h"
 #include "run/problem.h"
+#include "run/results.h"
 #include "run/settings.h"
 #include "run/solve.h"
 #include "scene/scene.h"
@@ -20,6 +21,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Small deformation is off by less than the first; gaps and normals that are off by more than the second are a reason
  * to compare, too. */
@@ -147,6 +149,7 @@ static uz_status choose(uz_result **result, const uz_problem *one, const uz_sett
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;
     left = enough ? *result : large;
+    uz_judge_quantity(large);
     left->summary.small = large->summary.small;
     count_both(&left->summary, enough ? &large->summary : &(*result)->summary);
     uz_result_free(enough ? large : *result);
@@ -159,7 +162,11 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
 {
     const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
     const double deadline = started + settings->time_limit_s;
-    if ((*result)->summary.outcome != UZ_CONVERGED || !is_asked(*result, one, own_laws))
+    const uz_outcome outcome = (*result)->summary.outcome;
+    const bool precise = outcome == UZ_PRECISION_LIMIT && (*result)->summary.certificate.relative_error <= COMPARED_TO;
+    const bool answered = outcome == UZ_CONVERGED || /* mesh_limit: of a quantity */
+                          (own_laws && (outcome == UZ_MESH_LIMIT || precise));
+    if (!answered || !is_asked(*result, one, own_laws))
         return UZ_OK;
     if (own_laws)
         return choose(result, one, settings, hooks, deadline, err);
@@ -174,10 +181,10 @@ bool uz_is_weighed(const uz_problem *problem)
            uz_has_finite_law(&problem->scene);
 }
 
-/* Of a case whose mesh was refined for small deformation: what that errs by there; *compared: false where that is
+/* Of a case whose mesh was chosen for small deformation: what that errs by there; *compared: false where that is
  * surely little. */
-static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
-                               const uz_hooks *hooks, double deadline, uz_error *err)
+static uz_status weigh_chosen(uz_small *small, bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
+                              const uz_hooks *hooks, double deadline, uz_error *err)
 {
     uz_problem one = uz_problem_of_case(problem, i);
     uz_settings coarse = uz_settings_default();
@@ -188,6 +195,9 @@ static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *resul
     if (!*compared)
         return UZ_OK;
     one.scene.kinematics = UZ_KINEMATICS_FINITE;
+    if (one.scene.box.automatic)
+        memcpy(one.scene.box.cells, result->grids->cells, sizeof one.scene.box.cells);
+    one.scene.box.automatic = false;
     one.scene.bisected = result->grids->bisected;
     one.scene.n_bisected = result->grids->n_bisected;
     one.n_quantities = 0;
@@ -201,10 +211,10 @@ static uz_status weigh_refined(uz_small *small, bool *compared, uz_result *resul
     return UZ_OK;
 }
 
-/* On a mesh that is refined for small deformation; where that is not enough, for one of the cases, on another one, that
- * is refined for large deformation, for all of them. */
-static uz_status solve_refined(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                               const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+/* On a mesh that is chosen for small deformation; where that is not enough, for one of the cases, on another one, that
+ * is chosen for large deformation, for all of them. */
+static uz_status solve_chosen(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                              const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
@@ -215,7 +225,7 @@ static uz_status solve_refined(uz_result **results, const uz_problem *problem, c
                                       : uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for %lld cases", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         bool compared;
-        status = weigh_refined(&small[i], &compared, results[i], problem, i, hooks, deadline, err);
+        status = weigh_chosen(&small[i], &compared, results[i], problem, i, hooks, deadline, err);
         if (status != UZ_OK && problem->n_cases > 0)
             uz_error_name_case(err, problem, i);
         enough = enough && (!compared || small[i].error <= TOLERABLE);
@@ -252,6 +262,6 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
         status = uz_check_finite_settings(problem, settings, err);
     if (status != UZ_OK)
         return status;
-    return problem->scene.refine ? solve_refined(results, problem, settings, starts, cache, hooks, err)
-                                 : uz_solve_given(results, problem, settings, starts, cache, hooks, err);
+    return uz_is_mesh_chosen(problem) ? solve_chosen(results, problem, settings, starts, cache, hooks, err)
+                                      : uz_solve_given(results, problem, settings, starts, cache, hooks, err);
 }

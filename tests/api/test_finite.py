@@ -464,7 +464,6 @@ def test_what_is_not_modelled_is_refused(s):
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
              (block(kinematics="auto", stabilize=True, supports=[{"on": "top", "uy": -0.3}]), "/problem/stabilize", "springs of your own"),
-             (block(mesh={"box": {"size": [1, 1], "cells": "auto"}}), "/problem/mesh/box/cells", "give their numbers"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
                "/solver/accuracy", "leave guaranteed out"),
               ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "refine the mesh")]

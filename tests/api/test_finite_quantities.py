@@ -87,7 +87,7 @@ def test_finer_meshes_are_in_their_intervals(s):
 
 
 def test_what_is_told_where_there_is_no_interval(s):
-    """Of a part of the load, no mesh's part, nor of an answer that stands in its obstacle; as accuracy a quantity is refused."""
+    """Of a part of the load, no mesh's part, nor of an answer that stands in its obstacle."""
     request = copy.deepcopy(BLOCK)
     request["problem"]["materials"][0]["law"] = "st_venant_kirchhoff"
     request["problem"]["supports"][1]["uy"] = -0.6
@@ -102,11 +102,50 @@ def test_what_is_told_where_there_is_no_interval(s):
     summary = s.solve(request)["summary"]
     one = summary["quantities"][0]
     check(summary["outcome"] == "mesh_limit" and "between rows" in one["why"] and one["low"] is None, summary)
-    request = copy.deepcopy(BLOCK)
-    request["solver"] = {"accuracy": {"quantity": "contact.force", "on": "bottom", "relative": 0.05}}
-    reply = s.post(request)
-    found = reply.json if reply.status != 202 else s.wait_status(reply.json["id"], "failed", "successful")["error"]
-    check(found["pointer"] == "/solver/accuracy" and "quantities beside the problem" in found["detail"], found)
+
+
+def beam(**more):
+    """That bends by half its length over a roller."""
+    return {"problem": {**BLOCK["problem"], "supports": [{"on": "left", "ux": 0, "uy": 0}], "loads": [{"on": "top", "traction": [0, -1.5e-3]}],
+                        "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [4, -1.2], "radius": 1}}}], **more}}
+
+
+def test_a_mesh_is_refined_for_a_quantity(s):
+    """Of large deformation as of small: it ends within what was asked for, with fewer elements than the whole error takes, and on a mesh that is
+    given mesh_limit tells where it does not. `auto` does the same."""
+    box = {"size": [6, 1], "cells": [6, 1], "element": "quad8"}
+    fine = beam(mesh={"box": {**box, "cells": [96, 16]}})
+    for ask in ({"quantity": "displacement", "on": "right", "direction": [0, 1]}, {"quantity": "contact.force", "on": "bottom"}, {"quantity": "reaction", "on": "left", "direction": [0, 1]}):
+        reference = solved(s, {**fine, "quantities": [ask]})["quantities"][0]
+        request = {**beam(mesh={"box": box, "refine": "auto"}), "solver": {"accuracy": {**ask, "relative": 0.02}}}
+        told = {kinematics: solved(s, {**request, "problem": {**request["problem"], "kinematics": kinematics}}) for kinematics in ("finite", "auto")}
+        for summary in told.values():
+            one = summary["quantities"][0]
+            check(one["low"] <= reference["value"] <= one["high"] and one["high"] - one["low"] <= 0.04 * abs(one["value"]), ask, one, reference)
+            check("finite" in summary and len(summary["mesh"]["ladder"]) > 1, summary["mesh"])
+        check(abs(told["finite"]["quantities"][0]["value"] - told["auto"]["quantities"][0]["value"]) < 1e-6 * abs(reference["value"]), told)
+        coarse = s.solve({**beam(mesh={"box": box}), "solver": {"accuracy": {**ask, "relative": 0.02}}})["summary"]
+        check(coarse["outcome"] == "mesh_limit" and "on this mesh, asked for 0.02" in coarse["message"], coarse["message"])
+        enough = solved(s, {**fine, "solver": {"accuracy": {**ask, "relative": 0.1}}})
+        check(enough["quantities"][0]["value"] == reference["value"], enough["quantities"])
+
+
+def test_cells_are_chosen(s):
+    """By the whole error and by a quantity: the answer is that of these cells when they are given, `auto` takes the same ones where large
+    deformation is needed, and grids begin where the one before has come to."""
+    for element, accuracy in (("quad4", {"total": 0.08}), ("quad8", {"total": 0.05}), ("quad8", {"quantity": "displacement", "on": "right", "direction": [0, 1], "relative": 0.02})):
+        chosen = lambda cells: {"box": {"size": [6, 1], "cells": cells, "element": element}}
+        found = [solved(s, {**beam(mesh=chosen("auto"), kinematics=kinematics), "solver": {"accuracy": accuracy}}) for kinematics in ("finite", "auto")]
+        check(found[0]["mesh"]["cells"] == found[1]["mesh"]["cells"] and "finite" in found[1], [one["mesh"] for one in found])
+        given = solved(s, {**beam(mesh=chosen(found[0]["mesh"]["cells"])), "quantities": [{"quantity": "displacement", "on": "right", "direction": [0, 1]}]})
+        check(abs(given["energy"]["strain"] / found[0]["energy"]["strain"] - 1) < 1e-5 and len(found[0]["mesh"]["ladder"]) > 1, given["energy"], found[0]["energy"])
+        check(found[0]["finite"]["qps"] < given["finite"]["qps"], found[0]["finite"], given["finite"])
+        error = found[0]["quantities"][0] if "quantity" in accuracy else found[0]["error"]["total"]
+        check(error <= accuracy["total"] if "total" in accuracy else error["high"] - error["low"] <= 0.04 * abs(error["value"]), error)
+    cube = {"model": "solid", "mesh": {"box": {"size": [1, 1, 1], "cells": "auto"}}, "supports": [{"on": "bottom", "ux": 0, "uy": 0, "uz": 0}], "contacts": [],
+            "loads": [{"on": "top", "traction": [0.1, 0, 0]}]}
+    limit = s.solve({**beam(**cube), "solver": {"accuracy": {"total": 0.01}}})["summary"]
+    check(limit["outcome"] == "mesh_limit" and "more than 20000 unknowns" in limit["message"] and limit["finite"]["load"] == 1, limit["message"])
 
 
 if __name__ == "__main__":
