@@ -234,9 +234,6 @@ void uz_rotation(double R[9], const double w[3]);
 void uz_rotation_vector(double w[3], const double R[9]);
 /* Of a group that u has moved as a rigid body: u(x) = t + (R - I) (x - point). */
 void uz_rigid_place(double t[3], double R[9], const uz_body_model *model, const uz_rigid_group *group, const double *u);
-/* Where u takes a point of the group to, or one beside it that goes with it. */
-void uz_rigid_point(double at[3], const uz_body_model *model, const uz_rigid_group *group, const double point[3],
-                    const double *u);
 /* A borrower of all of `model` but the shares of followers, which are those of a step from u: dofs of a group are dt
  * and size times w of it. UZ_ERR_MEMORY. */
 uz_status uz_body_turned(uz_body_model *out, const uz_body_model *model, const double *u, uz_error *err);
@@ -251,11 +248,6 @@ void uz_rigid_part(double at[3], const uz_body_model *model, int64_t a, const do
 /* K and K_fixed of `to` get what the forces f (n_nodes x dim) make of rotations from u. Those of nodes that follow
  * others go to these. */
 void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, const double *u, double *f);
-/* The same of one force, at the end r of an arm from the group's point: G, by rows, of rotations; and G for K and
- * K_fixed.
- */
-void uz_add_bend(double G[9], const double f[3], const double r[3]);
-void uz_add_turn_block(uz_body_model *to, const uz_rigid_group *group, const double G[9]);
 /* Are these the nodes of one rigid group, so that no element of them is strained? */
 bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count);
 /* Adds a block (dim x dim) of the dofs of two nodes to K and K_fixed, whose patterns have it. */
@@ -274,14 +266,6 @@ size_t uz_body_model_bytes(const uz_body_model *model);
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
  * Of large deformation without that, and without what follows the body: pressures and forces at points. */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* Whose nodes a load is on, of which one tells all (uz_check_finite_loads); NULL: no such. */
-const uz_rigid_group *uz_rigid_group_of_load(const uz_body_model *model, const uz_load *load);
-/* f += load i, a force at a point of a rigid group, of large deformation: it goes with the group, and its size and
- * direction stay, as does a moment in the plane. As forces on the nodes of the load's group where u has them, which
- * bear both. */
-uz_status uz_add_point_load(double *f, const uz_body_model *model, const uz_scene *scene, int64_t i, const double *u,
-                            uz_error *err);
-
 /* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then rotated back one
  * by one, so that its rounding is none of the energy. */
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried,

@@ -174,7 +174,7 @@ uz_status uz_body_model_build(uz_body_model *model, const uz_scene *scene, uz_bo
     if (status == UZ_OK && cells)
         status = uz_build_cells(&by_cells, model, scene, extent == UZ_BODY_CELLS, err);
     if (status == UZ_OK && extent != UZ_BODY_OUTLINE && !by_cells)
-        status = uz_build_stiffness(model, err);
+        status = uz_build_stiffness(model, scene, err);
     if (status != UZ_OK)
         uz_body_model_clear(model);
     return status;
@@ -185,7 +185,7 @@ uz_status uz_body_model_assemble(uz_body_model *model, uz_error *err)
     uz_csc_clear(&model->K);
     free(model->brick);
     model->brick = NULL;
-    return uz_build_stiffness(model, err);
+    return uz_build_stiffness(model, NULL, err);
 }
 
 uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)

@@ -25,9 +25,8 @@ static void add_to_nodes(const loading *x, const double *f, const int64_t *node,
         x->f[node[i / dim] * dim + i % dim] += f[i];
 }
 
-/* Where the shares (of 1) have their centre, and J w = sum s r x (w x r) about it. xyz: of the nodes. */
-static void second_moments(double centre[3], double J[3][3], const uz_mesh *mesh, const double *xyz,
-                           const double *share)
+/* Where the shares (of 1) have their centre, and J w = sum s r x (w x r) about it. */
+static void second_moments(double centre[3], double J[3][3], const uz_mesh *mesh, const double *share)
 {
     memset(centre, 0, 3 * sizeof *centre);
     memset(J, 0, 3 * sizeof *J);
@@ -35,7 +34,7 @@ static void second_moments(double centre[3], double J[3][3], const uz_mesh *mesh
         for (int64_t a = 0; a < mesh->n_nodes; a++) {
             double r[3] = {0};
             for (int c = 0; c < mesh->dim; c++)
-                r[c] = xyz[a * mesh->dim + c] - (pass == 0 ? 0 : centre[c]);
+                r[c] = mesh->xyz[a * mesh->dim + c] - (pass == 0 ? 0 : centre[c]);
             for (int i = 0; i < 3 && share[a] != 0; i++) {
                 centre[i] += pass == 0 ? share[a] * r[i] : 0;
                 for (int j = 0; j < 3 && pass == 1; j++)
@@ -45,14 +44,14 @@ static void second_moments(double centre[3], double J[3][3], const uz_mesh *mesh
 }
 
 /* A force at a point with a moment: f = s (v + w x r), so that sum f = v and sum r x f = J w. */
-static uz_status add_at_point(const loading *x, const double *share, const double *xyz, const double point[3],
-                              const uz_group *group, const char *where, uz_error *err)
+static uz_status add_at_point(const loading *x, const double *share, const uz_group *group, const char *where,
+                              uz_error *err)
 {
     const uz_mesh *mesh = &x->model->mesh;
     double centre[3], J[3][3], rows[3][3], arm[3], moment[3], w[3] = {0}, det, size = 0;
-    second_moments(centre, J, mesh, xyz, share);
+    second_moments(centre, J, mesh, share);
     for (int c = 0; c < 3; c++)
-        arm[c] = c < mesh->dim ? point[c] - centre[c] : 0;
+        arm[c] = c < mesh->dim ? x->load->point[c] - centre[c] : 0;
     uz_cross3(moment, arm, x->load->v);
     for (int c = 0; c < 3; c++) {
         moment[c] += x->load->moment[c];
@@ -71,7 +70,7 @@ static uz_status add_at_point(const loading *x, const double *share, const doubl
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
         double r[3] = {0}, turned[3];
         for (int c = 0; c < mesh->dim; c++)
-            r[c] = xyz[a * mesh->dim + c] - centre[c];
+            r[c] = mesh->xyz[a * mesh->dim + c] - centre[c];
         uz_cross3(turned, w, r);
         for (int c = 0; c < mesh->dim && share[a] != 0; c++)
             x->f[a * mesh->dim + c] += share[a] * (x->load->v[c] + turned[c]);
@@ -119,7 +118,7 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
         uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
         if (status == UZ_OK && x->load->has_point)
-            status = add_at_point(x, share, mesh->xyz, x->load->point, group, where, err);
+            status = add_at_point(x, share, group, where, err);
         for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && status == UZ_OK && !x->load->has_point; i++)
             x->f[i] += share[i / mesh->dim] * x->load->v[i % mesh->dim];
         free(share);
@@ -159,38 +158,6 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
                  scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on");
         status = add_load(&x, where, err);
     }
-    return status;
-}
-
-const uz_rigid_group *uz_rigid_group_of_load(const uz_body_model *model, const uz_load *load)
-{
-    const uz_group *group = uz_mesh_group(&model->mesh, load->on, "", NULL);
-    return group ? uz_rigid_group_of(model, uz_group_node_at(group, 0)) : NULL;
-}
-
-uz_status uz_add_point_load(double *f, const uz_body_model *model, const uz_scene *scene, int64_t i, const double *u,
-                            uz_error *err)
-{
-    const uz_mesh *mesh = &model->mesh;
-    const int64_t n = mesh->n_nodes * mesh->dim;
-    const loading x = {model, &scene->loads[i], f, true};
-    char where[96];
-    snprintf(where, sizeof where, "/loads/%lld/on", (long long)i);
-    const uz_group *group = uz_mesh_group(mesh, x.load->on, where, err);
-    const uz_rigid_group *rigid = uz_rigid_group_of_load(model, x.load);
-    if (!group || !rigid)
-        return UZ_ERR_SCENE;
-    double point[3], *xyz = uz_alloc(n, sizeof *xyz), *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);
-    uz_status status = xyz && share ? uz_spread_over_group(share, model, group, false, where, err)
-                                    : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
-    if (status == UZ_OK) {
-        for (int64_t k = 0; k < n; k++)
-            xyz[k] = mesh->xyz[k] + u[k];
-        uz_rigid_point(point, model, rigid, x.load->point, u);
-        status = add_at_point(&x, share, xyz, point, group, where, err);
-    }
-    free(xyz);
-    free(share);
     return status;
 }
 

@@ -117,10 +117,11 @@ bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double no
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
                           uz_error *err);
 
-/* mesh, dof -> K, K_fixed with their patterns, all values zero. */
-uz_status uz_build_pattern(uz_body_model *model, uz_error *err);
-/* mesh, dof, frames, materials, spring -> K, K_fixed. */
-uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
+/* mesh, dof -> K, K_fixed with their patterns, all values zero. scene: has room for what its forces at points do under
+ * large deformation; NULL: no such. */
+uz_status uz_build_pattern(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* mesh, dof, frames, materials, spring -> K, K_fixed. scene: as of uz_build_pattern. */
+uz_status uz_build_stiffness(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Adds a stiffness ke (full, square) of displacements along the axes at `count` nodes to K and K_fixed. */
 void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *node, int count);
 /* `brick` and, if it is wanted, K's diagonal, where the body is one whose rows bound a dof each (*made); else nothing.

@@ -240,7 +240,67 @@ static bool tie(neighbours *n)
     return true;
 }
 
-uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
+/* The nodes that carry a group's: into list, if there is one. Returns how many. */
+static int64_t list_carriers(int64_t *list, const uz_body_model *model, const uz_group *group)
+{
+    const uz_mesh *mesh = &model->mesh;
+    int64_t n = 0;
+    for (int64_t i = 0; i < uz_group_node_count(mesh, group); i++) {
+        const int64_t own = uz_group_node_at(group, i), *from;
+        const double *share;
+        int64_t count = uz_carriers(&from, &share, model, own);
+        if (count == 0 && uz_mesh_hangs(mesh, own))
+            count = uz_mesh_amid(&from, &share, mesh, own);
+        for (int64_t k = 0; k < (count > 0 ? count : 1); k++) {
+            const int64_t node = count > 0 ? from[k] : own;
+            int64_t earlier = 0;
+            while (list && earlier < n && list[earlier] != node)
+                earlier++;
+            if (list)
+                list[earlier] = node;
+            n += !list || earlier == n;
+        }
+    }
+    return n;
+}
+
+/* Under a force at a point of large deformation the group that it is spread over has a stiffness as if it were an
+ * element (finite/point_load.h). */
+static bool couple(neighbours *n, const uz_scene *scene)
+{
+    const uz_mesh *mesh = &n->model->mesh;
+    int64_t elements = mesh->n_elements, room = n->tied.first[mesh->n_elements];
+    for (int64_t i = 0; i < scene->n_loads && scene->kinematics == UZ_KINEMATICS_FINITE; i++) {
+        const uz_group *group = scene->loads[i].has_point ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL) : NULL;
+        room += group ? list_carriers(NULL, n->model, group) : 0;
+        elements += group != NULL;
+    }
+    if (elements == mesh->n_elements)
+        return true;
+    int64_t *first = uz_alloc(elements + 1, sizeof *first), *node = uz_alloc(room, sizeof *node);
+    const bool done = first && node;
+    if (done) {
+        memcpy(first, n->tied.first, (size_t)(mesh->n_elements + 1) * sizeof *first);
+        memcpy(node, n->tied.node, (size_t)first[mesh->n_elements] * sizeof *node);
+    }
+    for (int64_t i = 0, e = mesh->n_elements; done && e < elements; i++) {
+        const uz_group *group = scene->loads[i].has_point ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL) : NULL;
+        if (!group)
+            continue;
+        const int64_t count = list_carriers(node + first[e], n->model, group);
+        n->most_nodes = count > n->most_nodes ? count : n->most_nodes;
+        first[e + 1] = first[e] + count;
+        e++;
+    }
+    free(n->first);
+    free(n->node);
+    n->tied.first = n->first = first;
+    n->tied.node = n->node = node;
+    n->tied.n_elements = elements;
+    return done;
+}
+
+uz_status uz_build_pattern(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     neighbours n = {.model = model,
@@ -249,8 +309,8 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
                     .ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *n.ptr_fixed)};
     uz_status status = UZ_ERR_MEMORY;
     int64_t most = 0;
-    if (tie(&n))
-        n.around = uz_alloc(n.tied.first[mesh->n_elements], sizeof *n.around);
+    if (tie(&n) && (!scene || couple(&n, scene)))
+        n.around = uz_alloc(n.tied.first[n.tied.n_elements], sizeof *n.around);
     if (n.start && n.around && n.ptr && n.ptr_fixed) {
         uz_mesh_list_around(n.start, n.around, &n.tied);
         for (int64_t a = 0; a < mesh->n_nodes; a++)

@@ -130,25 +130,13 @@ static void displacement(double *u, const uz_body_model *model, const uz_rigid_g
     }
 }
 
-void uz_rigid_point(double at[3], const uz_body_model *model, const uz_rigid_group *group, const double point[3],
-                    const double *u)
-{
-    double t[3], R[9];
-    uz_rigid_place(t, R, model, group, u);
-    for (int i = 0; i < 3; i++) {
-        at[i] = group->point[i] + t[i];
-        for (int j = 0; j < 3; j++)
-            at[i] += R[3 * i + j] * (point[j] - group->point[j]);
-    }
-}
-
-void uz_add_bend(double G[9], const double f[3], const double r[3])
+static void add_bend(double G[9], const double f[3], const double r[3])
 {
     for (int i = 0; i < 9; i++)
         G[i] += 0.5 * (f[i / 3] * r[i % 3] + r[i / 3] * f[i % 3]) - (i % 4 == 0 ? uz_dot3(f, r) : 0);
 }
 
-void uz_add_turn_block(uz_body_model *to, const uz_rigid_group *group, const double G[9])
+static void add_turn_block(uz_body_model *to, const uz_rigid_group *group, const double G[9])
 {
     const int dim = to->mesh.dim;
     double block[9] = {0};
@@ -326,8 +314,8 @@ void uz_rigid_turn_stiffness(uz_body_model *to, const uz_body_model *model, cons
             for (int c = 0; c < 3; c++)
                 r[c] -= group->point[c] + t[c];
             memcpy(force, f + a * dim, (size_t)dim * sizeof *force);
-            uz_add_bend(G, force, r);
+            add_bend(G, force, r);
         }
-        uz_add_turn_block(to, group, G);
+        add_turn_block(to, group, G);
     }
 }

@@ -457,9 +457,9 @@ static void add_springs(uz_body_model *model)
     }
 }
 
-uz_status uz_build_stiffness(uz_body_model *model, uz_error *err)
+uz_status uz_build_stiffness(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    uz_status status = uz_build_pattern(model, err);
+    uz_status status = uz_build_pattern(model, scene, err);
     if (status == UZ_OK)
         status = add_all_elements(model, err);
     if (status == UZ_OK)

@@ -6,6 +6,7 @@
 #include "certificate/envelope.h"
 #include "certificate/pair_gaps.h"
 #include "certificate/piola.h"
+#include "certificate/point_force.h"
 #include "certificate/pressed_side.h"
 #include "certificate/rigid_groups.h"
 #include "certificate/swallowed.h"
@@ -525,12 +526,12 @@ static uz_status leave_over(work *w, uz_error *err)
     uz_status status = uz_nodal_loads(nodal, model, w->of->scene, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++)
         nodal[i] = (double)(nodal[i] - w->force[i]);
+    if (status == UZ_OK)
+        status = uz_point_forces(nodal, &w->tangent, w->of, err);
     if (status == UZ_OK) {
         uz_gather_nodal(w->f, model, nodal);
         uz_csc_gaxpy_t(w->f, &model->N, 1, w->of->r);
         status = model->n_rigid > 0 ? uz_rigid_groups_bend(&w->tangent, nodal, w->of, err) : UZ_OK;
-        if (status == UZ_OK)
-            status = uz_rigid_groups_load(w->f, &w->tangent, w->of, err);
     }
     free(nodal);
     return status;

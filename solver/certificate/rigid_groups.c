@@ -150,49 +150,6 @@ static void add_bend(uz_body_model *tangent, const group_at *at, const uz_finite
     uz_add_dof_block(tangent, at->group->anchor[1], at->group->anchor[1], block);
 }
 
-/* One force F at a point that goes with the group, whose arm is a: F on its translation, a x F and the moment on its
- * rotation; the way of the point bends as that of a node does. */
-static void add_point(double *f, uz_body_model *tangent, const group_at *at, const uz_load *load)
-{
-    const int dim = tangent->mesh.dim;
-    const int64_t *moved = tangent->dof + dim * at->group->anchor[0],
-                  *turned = tangent->dof + dim * at->group->anchor[1];
-    const double size = at->group->size, *F = load->v;
-    double a[3] = {0}, moment[3], H[9], block[9] = {0};
-    for (int i = 0; i < 9; i++)
-        a[i / 3] += (double)(at->R[i] * (load->point[i % 3] - at->group->point[i % 3]));
-    uz_cross3(moment, a, F);
-    for (int c = 0; c < dim; c++)
-        if (moved[c] >= 0)
-            f[moved[c]] += F[c];
-    for (int c = 0; c < (dim == 2 ? 1 : 3); c++) {
-        const int axis = dim == 2 ? 2 : c;
-        if (turned[c] >= 0)
-            f[turned[c]] += (moment[axis] + load->moment[axis]) / size;
-    }
-    for (int i = 0; i < 9; i++)
-        H[i] = (i % 4 == 0 ? uz_dot3(F, a) : 0) - (F[i / 3] * a[i % 3] + a[i / 3] * F[i % 3]) / 2;
-    for (int i = 0; i < dim * dim; i++)
-        block[i] = (dim == 3 ? H[i] : i == 0 ? H[8] : 0) / (size * size);
-    uz_add_dof_block(tangent, at->group->anchor[1], at->group->anchor[1], block);
-}
-
-uz_status uz_rigid_groups_load(double *f, uz_body_model *tangent, const uz_finite_answer *of, uz_error *err)
-{
-    for (int64_t i = 0; i < of->scene->n_loads; i++) {
-        const uz_load *load = &of->scene->loads[i];
-        if (!load->has_point)
-            continue;
-        const uz_rigid_group *group = uz_rigid_group_of_load(of->model, load);
-        group_at at;
-        if (!group)
-            return uz_fail(err, UZ_ERR_SCENE, "/loads", "\"%.63s\" is no rigid group", load->on);
-        find_group(&at, of, group);
-        add_point(f, tangent, &at, load);
-    }
-    return UZ_OK;
-}
-
 double uz_rigid_groups_off(const uz_finite_answer *of)
 {
     double most = 0;

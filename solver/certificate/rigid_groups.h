@@ -11,8 +11,5 @@ double uz_rigid_groups_off(const uz_finite_answer *of);
 /* The tangent gets what forces on the nodes of groups do as these turn. nodal (n_nodes x dim): loads less internal
  * forces; it becomes the gradient of the Lagrangian. UZ_ERR_MEMORY. */
 uz_status uz_rigid_groups_bend(uz_body_model *tangent, double *nodal, const uz_finite_answer *of, uz_error *err);
-/* Forces at points of groups, and moments about these: on the free dofs f (d) of the groups, and what they do as these
- * turn. UZ_ERR_SCENE: a load's group is none, or not of a rigid one. */
-uz_status uz_rigid_groups_load(double *f, uz_body_model *tangent, const uz_finite_answer *of, uz_error *err);
 
 #endif

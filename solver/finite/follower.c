@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "finite/point_load.h"
 #include "linalg/linalg.h"
 
 #include <math.h>
@@ -77,7 +78,7 @@ uz_status uz_follower_loads(double *f, const uz_body_model *model, const uz_scen
 {
     const int dim = model->mesh.dim;
     for (int64_t i = 0; i < scene->n_loads; i++) {
-        const uz_status status = scene->loads[i].has_point ? uz_add_point_load(f, model, scene, i, u, err) : UZ_OK;
+        const uz_status status = scene->loads[i].has_point ? uz_point_load(f, model, scene, i, u, err) : UZ_OK;
         if (status != UZ_OK)
             return status;
         if (scene->loads[i].kind != UZ_LOAD_PRESSURE)
@@ -131,38 +132,6 @@ static uz_status gather_skew(uz_csc *out, const uz_body_model *model, const uz_e
     return UZ_OK;
 }
 
-/* A force at a point of a rigid group is a dead one there, whatever forces on nodes it is put on as: the stiffness of
- * rotations that these have as dead ones (uz_rigid_turn_stiffness) goes, and that of the one at the point comes. */
-static uz_status turn_point(uz_body_model *tangent, const uz_scene *scene, int64_t i, const double *u, uz_error *err)
-{
-    const uz_mesh *mesh = &tangent->mesh;
-    const int dim = mesh->dim;
-    double *f = uz_alloc_zero(mesh->n_nodes * dim, sizeof *f), t[3], R[9], at[3], back[3], G[9] = {0};
-    uz_status status = f ? uz_add_point_load(f, tangent, scene, i, u, err)
-                         : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
-    if (status == UZ_OK) {
-        const uz_rigid_group *group = uz_rigid_group_of_load(tangent, &scene->loads[i]);
-        uz_rigid_place(t, R, tangent, group, u);
-        uz_rigid_point(at, tangent, group, scene->loads[i].point, u);
-        for (int c = 0; c < 3; c++) {
-            at[c] -= group->point[c] + t[c];
-            back[c] = -scene->loads[i].v[c];
-        }
-        uz_add_bend(G, back, at);
-        for (int64_t a = 0; a < mesh->n_nodes; a++) {
-            double r[3] = {0}, own[3] = {0};
-            for (int c = 0; c < dim; c++) {
-                r[c] = mesh->xyz[dim * a + c] + u[dim * a + c] - group->point[c] - t[c];
-                own[c] = f[dim * a + c];
-            }
-            uz_add_bend(G, own, r);
-        }
-        uz_add_turn_block(tangent, group, G);
-    }
-    free(f);
-    return status;
-}
-
 uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_scene *scene, const double *u,
                               uz_error *err)
 {
@@ -172,7 +141,7 @@ uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_sce
     uz_csc_clear(skew);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
         if (scene->loads[i].has_point)
-            status = turn_point(tangent, scene, i, u, err);
+            status = uz_point_tangent(tangent, scene, i, u, err);
         if (status != UZ_OK || scene->loads[i].kind != UZ_LOAD_PRESSURE)
             continue;
         const uz_group *group = sides_of(tangent, scene, i, err);

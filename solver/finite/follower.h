@@ -1,4 +1,4 @@
-/* follower.h: loads that follow the body: forces at points of rigid groups, and pressures, which turn and grow with the
+/* follower.h: loads that follow the body: forces at points (point_load.h), and pressures, which turn and grow with the
  * deformed sides that they act on.
  *
  * With x the places of a side's nodes, f_a = -p integral N_a n da over the deformed side. In plane stress a side has
@@ -16,9 +16,9 @@ bool uz_has_followers(const uz_scene *scene);
 /* f (n_nodes x dim) += their forces on the body displaced by u (n_nodes x dim). */
 uz_status uz_follower_loads(double *f, const uz_body_model *model, const uz_scene *scene, const double *u,
                             uz_error *err);
-/* Of their derivative in displacements: the symmetric part is taken off K and K_fixed of `tangent` (uz_finite_body);
- * *skew, n_nodes x dim square, by places in u, is the skew part: without entries where that is none but for rounding.
- * The caller clears *skew, also on failure. */
+/* Of their derivative in displacements: the symmetric part is taken off K and K_fixed of `tangent` (uz_finite_body; of
+ * forces at points off K); *skew, n_nodes x dim square, by places in u, is the skew part: without entries where that is
+ * none but for rounding. The caller clears *skew, also on failure. */
 uz_status uz_follower_tangent(uz_body_model *tangent, uz_csc *skew, const uz_scene *scene, const double *u,
                               uz_error *err);
 

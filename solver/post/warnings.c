@@ -221,11 +221,6 @@ static void look_at_small_only(const doubts *d)
     const char *what = partly ? "rigid groups of which one rotation is held" : NULL;
     for (int64_t k = 0; k < d->model->n_materials; k++)
         what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
-    for (int64_t k = 0; k < d->scene->n_loads; k++) {
-        const uz_load *load = &d->scene->loads[k];
-        if (load->has_point && !uz_rigid_group_of_load(d->model, load))
-            what = "forces at a point";
-    }
     if (what && d->out->nonlinear > UZ_MOST_SLIDING)
         warn(d->out, "large_deformation", d->out->nonlinear,
              "small deformation errs by some %.2g %% as rotations are large, and %s have no other: put less load on it",

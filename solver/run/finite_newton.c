@@ -162,12 +162,12 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
     if (!*fits)
         return UZ_OK;
     memcpy(place->loads, run->loads, (size_t)run->n * sizeof *place->loads);
-    if (run->follows && uz_follower_loads(place->loads, &run->base, &run->scene, place->u, err) != UZ_OK)
-        return UZ_ERR_SCENE;
+    uz_status status = run->follows ? uz_follower_loads(place->loads, &run->base, &run->scene, place->u, &own) : UZ_OK;
     run->scene.place = place->u;
     memcpy(place->given, run->prescribed, (size_t)run->base.n_fixed * sizeof *place->given);
     uz_rigid_ways(place->given, &run->base, run->prescribed, place->u);
-    uz_status status = uz_body_turned(&place->turned, &run->base, place->u, &own);
+    if (status == UZ_OK)
+        status = uz_body_turned(&place->turned, &run->base, place->u, &own);
     if (status == UZ_OK)
         status = uz_body_model_move(&place->rows, &place->turned, &run->scene, &own);
     if (status == UZ_OK)

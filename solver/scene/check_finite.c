@@ -122,21 +122,24 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
-/* *rigid: are all nodes of a group of one that is rigid? mesh NULL: is there any that is? */
-static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *mesh, const char *on, uz_error *err)
+/* Nodes of a group that a force at a point is spread over, which has a stiffness of all of them at once. */
+enum { MOST_POINT_NODES = 1500 };
+
+/* *rigid: are all nodes of a group of one that is rigid? */
+static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *mesh, const uz_group *group,
+                            uz_error *err)
 {
-    const uz_group *group = mesh ? uz_mesh_group(mesh, on, "", NULL) : NULL; /* is not there: that is told elsewhere */
     *rigid = false;
     for (int64_t k = 0; k < scene->n_supports && !*rigid; k++) {
         if (scene->supports[k].kind != UZ_SUPPORT_RIGID)
             continue;
-        const uz_group *whole = group ? uz_mesh_group(mesh, scene->supports[k].on, "", NULL) : NULL;
+        const uz_group *whole = uz_mesh_group(mesh, scene->supports[k].on, "", NULL);
         unsigned char *of = whole ? uz_alloc_zero(mesh->n_nodes, sizeof *of) : NULL;
         if (whole && !of)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the nodes of a rigid group");
         for (int64_t i = 0; of && i < uz_group_node_count(mesh, whole); i++)
             of[uz_group_node_at(whole, i)] = 1;
-        *rigid = !group || of;
+        *rigid = of;
         for (int64_t i = 0; of && i < uz_group_node_count(mesh, group) && *rigid; i++)
             *rigid = of[uz_group_node_at(group, i)];
         free(of);
@@ -144,26 +147,29 @@ static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *m
     return UZ_OK;
 }
 
-/* mesh: as of find_rigid. */
+/* mesh NULL: what does not depend on it. */
 static uz_status check_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const double *moment = scene->loads[i].moment;
+        const uz_group *group = scene->loads[i].has_point && mesh ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL)
+                                                                  : NULL; /* is not there: that is told elsewhere */
+        const int64_t nodes = group ? uz_group_node_count(mesh, group) : 0;
         bool rigid = true;
-        const uz_status status =
-            scene->loads[i].has_point ? find_rigid(&rigid, scene, mesh, scene->loads[i].on, err) : UZ_OK;
+        const uz_status status = mesh && nodes > MOST_POINT_NODES ? find_rigid(&rigid, scene, mesh, group, err) : UZ_OK;
         if (status != UZ_OK)
             return status;
         if (!rigid)
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
-                           "where the body goes a point goes with rigid groups alone: make \"%.63s\" such a group by a "
-                           "support with rigid, leave at and moment out, or use the kinematics \"moving\"",
-                           scene->loads[i].on);
+                           "a point goes with a group of up to %d nodes, which it couples, and \"%.63s\" has %lld: "
+                           "name a part of it, or make it rigid by a support",
+                           MOST_POINT_NODES, scene->loads[i].on, (long long)nodes);
         if (scene->loads[i].has_point && scene->model == UZ_SOLID && uz_dot3(moment, moment) > 0)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "moment"),
-                           "the work of a moment that keeps its direction depends on the way in space: turn the group "
-                           "by rx, ry and rz, or put forces on its points");
+            return uz_fail(
+                err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "moment"),
+                "the work of a moment that keeps its direction depends on the way in space: put two opposite "
+                "forces at points of the group or beside it, or turn it by rx, ry and rz as a rigid group");
         if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE && !uz_may_be_finite(scene))
             return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
                            "small deformation of the linear law is not compared with large where there is temperature");

@@ -3,9 +3,12 @@ beside them, and forces at points of them: by closed forms and by the same body 
 # not under ThreadSanitizer: about answers, not about threads
 import math
 
+import numpy
+
 import service
 from service import check
 from test_finite_supports import answer, refused, scene
+from test_tied import stacked
 from two_bodies import SOLID, body
 
 SHARED = True  # one service for all tests
@@ -356,15 +359,119 @@ def test_a_moment_rolls_a_strip_up(s):
     check(abs(last["resultants"]["supports"][1]["rigid"]["rotation"][0] - 0.6 * angle) < 0.01 * angle and last["outcome"] == "converged", last["resultants"])
 
 
+# ---- forces at points of groups that deform
+
+def turning(found, on, dim):
+    """The place and the rotation of a side, by its nodes' mean and the rotation that fits best."""
+    x, u = numpy.array(found["nodes"]), numpy.array(found["displacements"])
+    rest = x[on(x)]
+    now = rest + u[on(x)]
+    left, _, right = numpy.linalg.svd((now - now.mean(0)).T @ (rest - rest.mean(0)))
+    left[:, -1] *= numpy.sign(numpy.linalg.det(left @ right))
+    return now.mean(0) - rest.mean(0), left @ right
+
+
+def strip(loads, rigid=False, kinematics="finite", angle=None, **more):
+    """Slender, of a law that makes it an elastica, by its end."""
+    group = {"on": "right", "rigid": {"point": [10, 0.05], **({"rz": angle} if angle else {})}}
+    return scene("st_venant_kirchhoff", 0, mesh={"box": {"size": [10, 0.1], "cells": [20, 1], "element": "quad8"}, **more}, kinematics=kinematics,
+                 supports=[{"on": "left", "ux": 0, "uy": 0}, *([group] if rigid else [])], loads=[{"on": "right", **load} for load in loads])
+
+
+def test_a_side_that_deforms_bears_forces_beside_it_and_moments(s):
+    """As one that is rigid and hardly strained does, however far it turns: by a moment to an arc, by dead forces at arms. A moment, and two
+    opposite forces at points that have it where the side has come to, are the same."""
+    moment = 0.1 ** 3 / 12 * math.radians(150) / 10
+    beside = {"arm": [{"force": [0, 1e-5], "at": [13, 0.05]}], "across": [{"force": [-1e-5, 1e-5], "at": [10, 2]}], "moment": [{"force": [0, 0], "at": [10, 0.05], "moment": [moment]}]}
+    for name, loads in beside.items():
+        soft, rigid = (answer(s, strip(loads, rigid)) for rigid in (False, True))
+        check(farthest(soft, rigid) < 1e-5 and math.hypot(*soft["displacements"][-1]) > 7, name, farthest(soft, rigid))
+        check(soft["summary"]["finite"]["failed"] == 0 and soft["summary"]["finite"]["qps"] <= 15, name, soft["summary"]["finite"])
+        loads = [found["summary"]["resultants"]["loads"] for found in (soft, rigid)]
+        check(math.dist(loads[0]["force"], loads[1]["force"]) < 1e-12 and abs(loads[0]["moment"][0] - loads[1]["moment"][0]) < 1e-10, name, loads)
+        auto = answer(s, strip(beside[name], kinematics="auto"))
+        check(farthest(soft, auto) < 1e-6 and auto["summary"]["small_deformation"]["error"] > 0.3, name, auto["summary"]["small_deformation"])
+    _, turned = turning(soft, lambda x: x[:, 0] > 10 - 1e-9, 2)
+    check(abs(math.degrees(math.atan2(turned[1, 0], turned[0, 0])) - 150) < 3, turned)
+    soft = answer(s, strip([{"force": [0, 0], "at": [10, 0.05], "moment": [0.4 * moment]}]))
+    _, turned = turning(soft, lambda x: x[:, 0] > 10 - 1e-9, 2)
+    pair = numpy.array([0, 0.4 * moment / 2 / 3 / turned[0, 0]])  # at 3 to both sides of the middle
+    pulled = answer(s, strip([{"force": list(-pair), "at": [7, 0.05]}, {"force": list(pair), "at": [13, 0.05]}]))
+    check(farthest(pulled, soft) < 1e-5, farthest(pulled, soft))
+    job = s.post({**strip(beside["moment"]), "cases": [{"name": "way", "steps": [0.5, 1, 0.6]}]}).json["id"]
+    check(s.wait_status(job, "successful", "failed")["status"] == "successful", job)
+    found = s.get(f"/v1/jobs/{job}/result?fields=summary,displacements,nodes&case=way").json
+    back = answer(s, strip([{"force": [0, 0], "at": [10, 0.05], "moment": [0.6 * moment]}]))
+    check(found["summary"]["outcome"] == "converged" and farthest(found, back) < 1e-5, found["summary"])
+
+
+def test_soft_sides_go_with_their_points_as_the_whole_scene_turns(s):
+    """A block that a force beside its side strains by a half: with another material's stiffness, refined, and with all of it turned by 30
+    degrees; its column beside a free end tips under the load of a block that is as stiff there."""
+    angle = math.radians(30)
+    turn = lambda v: [math.cos(angle) * v[0] - math.sin(angle) * v[1], math.sin(angle) * v[0] + math.cos(angle) * v[1]]
+    for kind, law in (("quad4", "neo_hooke"), ("quad8", "neo_hooke_isochoric"), ("tri6", "st_venant_kirchhoff")):
+        found = []
+        for way in (lambda v: v, turn):
+            request = body((kind,), [(6, 3)], [lambda x, y: way([2 * x, y])], {"foot": [(0, "left")], "head": [(0, "right")]}, model="plane_strain", kinematics="finite",
+                           materials=[{**MATERIAL, "law": law}], supports=[{"on": "foot", "ux": 0, "uy": 0}],
+                           loads=[{"on": "head", "force": way([0.05, -0.05]), "at": way([2.5, 0.8]), "moment": [0.01]}])
+            found.append(answer(s, request))
+        off = max(math.dist(turn(u), v) for u, v in zip(*(one["displacements"] for one in found)))
+        most = max(math.hypot(*u) for u in found[0]["displacements"])
+        check(off < 1e-7 and most > 0.4, kind, off, most)
+        check(found[0]["summary"]["finite"]["qps"] == found[1]["summary"]["finite"]["qps"] <= 8, [one["summary"]["finite"] for one in found])
+    refined = []
+    for kinematics in ("finite", "auto"):
+        request = strip([{"force": [0, 1e-5], "at": [11, 0.05]}], kinematics=kinematics, refine="auto")
+        refined.append(answer(s, {**request, "solver": {"accuracy": {"total": 0.02}}}, forces=False))
+    check(refined[0]["summary"]["mesh"]["refined"] and refined[0]["nodes"] == refined[1]["nodes"] and farthest(*refined) < 1e-6, refined[0]["summary"]["mesh"])
+    ends = [answer(s, strip([{"force": [-1e-5, 0], "at": [13, 0.05]}], rigid), "unstable", forces=False)["summary"]["finite"]["load"] for rigid in (False, True)]
+    euler = 0.1 ** 3 / 12 * 0.12199 ** 2 / 1e-5  # k tan(10 k) = 1 / 3, of a clamped column with a rigid arm of 3
+    check(abs(ends[0] / ends[1] - 1) < 2e-3 and abs(ends[0] / euler - 1) < 0.01, ends, euler)
+
+
+def test_two_opposite_forces_twist_a_bar(s):
+    """In space, by a rigid end and by one that deforms: two dead forces beside it have the moment that a prescribed rotation takes."""
+    n, clamp = {"ux": 0, "uy": 0, "uz": 0}, 60
+    def bar(loads, **rigid):
+        return scene(model="solid", mesh={"box": {"size": [4, 1, 1], "cells": [4, 3, 3], "element": "hex20"}}, loads=loads,
+                     supports=[{"on": "left", **n}, *([{"on": "right", "rigid": {"point": [4, 0.5, 0.5], **rigid["rigid"]}}] if rigid else [])])
+    turned = answer(s, bar([], rigid={"rx": clamp, "ry": 0, "rz": 0}), forces=False)
+    group = turned["summary"]["resultants"]["supports"][1]
+    force = group["rigid"]["moment"][0] / 2 / 1.5 / math.cos(math.radians(clamp))  # at 1.5 to both sides
+    pair = [{"on": "right", "force": [0, 0, sign * force], "at": [4, 0.5 + sign * 1.5, 0.5]} for sign in (1, -1)]
+    rigid, soft = answer(s, bar(pair, rigid={}), forces=False), answer(s, bar(pair), forces=False)
+    check(farthest(turned, rigid) < 1e-5, farthest(turned, rigid))
+    _, R = turning(soft, lambda x: x[:, 0] > 4 - 1e-9, 3)
+    about = math.degrees(math.atan2(R[2, 1], R[1, 1]))
+    check(0 < about - clamp < 6 and soft["summary"]["finite"]["qps"] <= 10, about, soft["summary"]["finite"])  # its end may warp
+    forces = numpy.array(soft["summary"]["resultants"]["loads"]["moment"])
+    check(abs(forces[0] - 2 * 1.5 * force * math.cos(math.radians(about))) < 0.01 * forces[0], forces, about)
+
+
+def test_points_go_with_tied_sides(s):
+    """A force beside a tie, spread over either of its sides, of which one follows the other: the same."""
+    for kind in ("quad4", "hex8"):
+        solid = kind in SOLID
+        found = [answer(s, stacked((kind, kind), supports=[{"on": "foot", "ux": 0, "uy": 0, **({"uz": 0} if solid else {})}], kinematics="finite",
+                                   materials=[{"on": "all", "young": 1000, "poisson": 0.3, "law": "neo_hooke"}],
+                                   loads=[{"on": on, "force": [30, -20, *[10] * solid], "at": [0.6, 0.4, 1.7] if solid else [0.5, 1.6]}])) for on in ("roof", "floor")]
+        check(farthest(*found) < 1e-8 and found[0]["summary"]["finite"]["displacement"] > 0.5, kind, farthest(*found))
+        check(all(one["summary"]["finite"]["qps"] <= 5 for one in found), kind, [one["summary"]["finite"] for one in found])
+
+
 def test_points_that_go_with_nothing(s):
-    for model, rigid, load, pointer, word in (("plane_strain", "left", {"force": [0, 1], "at": [2, 1]}, "at", "by a support with rigid"),
-                                              ("plane_strain", None, {"force": [0, 1], "at": [2, 1]}, "at", "by a support with rigid"),
-                                              ("solid", "right", {"force": [0, 1, 0], "at": [2, 1, 0], "moment": [1, 0, 0]}, "moment", "rx, ry and rz")):
-        dim = 3 if model == "solid" else 2
-        held = {"on": "top", "ux": 0, "uy": 0, **({"uz": 0} if dim == 3 else {})} if rigid == "left" else {"on": "left", "ux": 0, "uy": 0, **({"uz": 0} if dim == 3 else {})}
+    held = {"on": "left", "ux": 0, "uy": 0}
+    many = {"box": {"size": [2, 1], "cells": [2, 1600]}}
+    for request, pointer, word in (({"model": "solid", "mesh": {"box": {"size": [2, 1, 1], "cells": [2, 1, 1]}}, "supports": [{**held, "uz": 0}],
+                                     "loads": [{"on": "right", "force": [0, 1, 0], "at": [2, 1, 0], "moment": [1, 0, 0]}]}, "moment", "two opposite forces"),
+                                   ({"mesh": many, "supports": [held], "loads": [{"on": "right", "force": [0, 1], "at": [2, 1]}]}, "at", "make it rigid"),
+                                   ({"mesh": {"nodes": [[0, 0], [2, 0], [2, 1], [0, 1]], "elements": {"quad4": [[0, 1, 2, 3]]},
+                                              "groups": {"left": {"edges": [[3, 0]]}, "tip": {"nodes": [2]}}},
+                                     "supports": [held], "loads": [{"on": "tip", "force": [0, 1], "at": [2, 1]}]}, "on", "one point")):
         for kinematics in ("finite", "auto"):
-            refused(s, scene(model=model, kinematics=kinematics, mesh={"box": {"size": [2, 1, 1][:dim], "cells": [2, 1, 1][:dim]}}, loads=[{"on": "right", **load}],
-                             supports=[held, *([{"on": rigid, "rigid": {"point": [0, 0, 0][:dim]}}] if rigid else [])]), f"/loads/0/{pointer}", word)
+            refused(s, scene(kinematics=kinematics, **request), f"/loads/0/{pointer}", word)
 
 
 if __name__ == "__main__":

@@ -80,6 +80,7 @@ PHRASES = {
     "| 60 x 20 | 1.838e-3 | 1603 | -3.9620174378e-3 | -10.53866779 | 44 |": reference(("-3.9620174378e-3", "-10.53866779")),
     "| 120 x 40 | 3.625e-3 | 3161 | -3.9624809230e-3 | -10.54546589 | 88 |": reference(("-3.9624809230e-3", "-10.54546589")),
     "SIAM J. Imaging Sciences 2, 2009": None, "Foundations of Computational Mathematics 15, 2015": None, "Methods in Engineering 24, 1987": None,
+    "Optical Society of America A 4, 1987": None, "The group may have 1,500 nodes": constant(1500, r"MOST_POINT_NODES = (\d+)"),
     "Applied Mathematics 5, 1947": None, "SIAM J. Scientific Computing 23, 2001": None, "Equilibrium Finite Element Formulations, 2017": None,
     "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define UZ_SUM_ROUNDING +([\d.e-]+)"),
     "off the middles of their sides by up to 1e-5 of these": constant(1e-5, r"#define NEARLY +([\d.e-]+)"),

@@ -87,7 +87,7 @@ static void check_against_plain_assembly(bool distorted)
         uz_csc_clear(&model.K);
         uz_csc_clear(&model.K_fixed);
         distort(&model.mesh, 0.1);
-        CHECK(uz_build_stiffness(&model, &err) == UZ_OK);
+        CHECK(uz_build_stiffness(&model, NULL, &err) == UZ_OK);
     }
     const int64_t n = model.mesh.n_nodes * 2;
     double *full = plain_stiffness(&model), *K = dense_symmetric(&model.K);
@@ -133,7 +133,7 @@ TEST(inverted_element_is_named)
     uz_csc_clear(&model.K_fixed);
     model.mesh.uniform = false;
     model.mesh.xyz[2 * 6] = -5; /* node 6 belongs to elements 1, 2, 4, 5 */
-    CHECK(uz_build_stiffness(&model, &err) == UZ_ERR_SCENE);
+    CHECK(uz_build_stiffness(&model, NULL, &err) == UZ_ERR_SCENE);
     CHECK_MSG(strstr(err.message, "element 1 (nodes 1, 2, 6, 5)"), "%s", err.message);
     CHECK_STR(err.where, "/mesh/elements");
     uz_body_model_clear(&model);

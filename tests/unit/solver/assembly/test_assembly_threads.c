@@ -85,7 +85,7 @@ TEST(the_first_bad_element_is_named)
         uz_csc_clear(&body.K);
         uz_csc_clear(&body.K_fixed);
         uz_aside_allow(threads);
-        CHECK_INT(uz_build_stiffness(&body, &err), UZ_ERR_SCENE);
+        CHECK_INT(uz_build_stiffness(&body, NULL, &err), UZ_ERR_SCENE);
         CHECK_STR(err.where, "/mesh/elements");
         if (threads == 1)
             strcpy(said, err.message);

@@ -184,7 +184,7 @@ static uz_problem asking_problem(void)
     return problem;
 }
 
-/* Large deformation on a spring, with a rigid side. */
+/* Large deformation on a spring, with a rigid side and a force beside another. */
 static uz_problem finite_supports_problem(void)
 {
     uz_problem problem = asking_problem();
@@ -199,6 +199,11 @@ static uz_problem finite_supports_problem(void)
     scene->supports[2].kind = UZ_SUPPORT_RIGID;
     for (int c = 0; c < 3; c++)
         scene->supports[2].turn[c] = NAN;
+    add_load(scene, "bottom", 0.1, 0);
+    uz_load *beside = &scene->loads[scene->n_loads - 1];
+    beside->kind = UZ_LOAD_FORCE;
+    beside->has_point = true;
+    beside->point[1] = -1;
     return problem;
 }
 
