@@ -414,9 +414,6 @@ static bool decode_stabilize(uz_scene *out, decoding *d, const json_value *value
     double young = 0;
     if (!json_truth(value))
         return true;
-    if (out->kinematics == UZ_KINEMATICS_FINITE)
-        return decode_refuse(d, "not_allowed", value,
-                             "is of small deformation; with kinematics finite the supports hold the body.");
     uz_support *grown = room_grow(out->supports, (size_t)out->n_supports + 1, sizeof *grown);
     if (!grown) {
         problem_no_memory(d->problem);

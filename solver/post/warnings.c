@@ -594,9 +594,12 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
 {
     const doubts d = {.model = model,
                       .scene = scene,
+                      .u = result->u,
+                      .r = result->r,
                       .mesh_error = result->summary.discretization_error,
                       .out = result->evaluation,
                       .large = true};
+    look_at_stabilizer(&d);
     look_at_mesh(&d);
 }
 

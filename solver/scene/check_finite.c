@@ -88,11 +88,6 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                        "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
                        "and nearly incompressible bodies");
-    if (scene->stabilizer > 0)
-        return uz_fail(
-            err, UZ_ERR_SCENE, "/stabilize",
-            "finite kinematics do not tell what such springs do to the answer; hold the body by supports, or "
-            "by springs of your own");
     for (int64_t i = 0; i < scene->n_supports && scene->model == UZ_SOLID; i++) {
         const uz_support *support = &scene->supports[i];
         int held = 0, moved = 0;

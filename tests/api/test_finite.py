@@ -6,7 +6,7 @@ import math
 
 import service
 from service import check, expect
-from two_bodies import brick
+from two_bodies import body, brick
 
 SHARED = True  # one service for all tests
 
@@ -452,6 +452,31 @@ def test_a_mesh_is_refined(s):
     check(true < 0.1, true, coarser["error"])
 
 
+def test_bodies_that_contact_alone_holds_are_stabilized(s):
+    """By springs whose forces are told: the closed form of a block that nothing holds aside, and a block in a bowl that is pressed by a load
+    alone, which a symmetric half of both tells."""
+    for kinematics in ("finite", "auto"):
+        summary = s.solved(block(kinematics=kinematics, stabilize=True, supports=[{"on": "top", "uy": -0.3}]), "converged")["summary"]
+        warning, = [one for one in summary["warnings"] if one["code"] == "stabilized"]
+        check("finite" in summary and 0 < warning["value"] < 1e-5 and abs(summary["contact"]["force"][1] / 0.45842392 - 1) < 1e-5, summary["contact"], warning)
+    for kind in ("quad4", "quad8"):
+        found = []
+        for half in (False, True):
+            width = lambda x, w: w * x if half else w * (2 * x - 1)
+            request = body((kind, kind), [(8, 4), (4, 2)] if half else [(16, 4), (8, 2)],
+                           [lambda x, y: (width(x, 2), y * (1 + 0.2 * width(x, 2) ** 2)), lambda x, y: (width(x, 1), 1 + 0.25 * width(x, 1) ** 2 + 0.6 * y)],
+                           {"floor": [(0, "bottom")], "bowl": [(0, "top")], "under": [(1, "bottom")], "head": [(1, "top")], "middle": [(0, "left"), (1, "left")]},
+                           model="plane_strain", kinematics="finite", materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}], stabilize=True,
+                           contacts=[{"on": "under", "with": "bowl", "smooth": False}], supports=[{"on": "floor", "ux": 0, "uy": 0}, *([{"on": "middle", "ux": 0}] if half else [])],
+                           loads=[{"on": "head", "traction": [0, -0.1]}])
+            summary = s.solved(request, "converged")["summary"]
+            check([one["value"] < 1e-5 for one in summary["warnings"] if one["code"] == "stabilized"] == [True], summary["warnings"])
+            found.append(summary)
+        check(abs(found[0]["energy"]["strain"] / found[1]["energy"]["strain"] / 2 - 1) < 1e-4 and found[0]["finite"]["displacement"] > 0.1, kind,
+              [(one["energy"]["strain"], one["finite"]) for one in found])
+        check(found[0]["finite"]["qps"] <= found[1]["finite"]["qps"] + 4, [one["finite"] for one in found])
+
+
 def test_what_is_not_modelled_is_refused(s):
     asked = [(stacked(0, smooth=True), "/problem/contacts/0/smooth", "quad8"),
              (stacked(0, discretization="nodes"), "/problem/contacts/0/discretization", "leave discretization out"),
@@ -463,7 +488,6 @@ def test_what_is_not_modelled_is_refused(s):
               "/problem/contacts/0/obstacle/height", "cylinders"),
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
-             (block(kinematics="auto", stabilize=True, supports=[{"on": "top", "uy": -0.3}]), "/problem/stabilize", "springs of your own"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
                "/solver/accuracy", "leave guaranteed out"),
               ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "refine the mesh")]
