@@ -339,14 +339,6 @@ static int by_order(const void *a, const void *b)
                                 : (x->side > y->side) - (x->side < y->side);
 }
 
-/* The mean of all nodes. */
-static void middle_of(double middle[3], const uz_mesh *mesh)
-{
-    memset(middle, 0, 3 * sizeof *middle);
-    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
-        middle[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
-}
-
 /* Where a surface touches itself what a zone is depends on how much of the body the surface has, and its zones are of
  * one body: they have no sizes. */
 static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, const uz_mortar_pair *pair)
@@ -355,7 +347,7 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
     const int dim = model->mesh.dim;
     double middle[3];
     bool itself = false;
-    middle_of(middle, &model->mesh);
+    uz_mesh_middle(middle, &model->mesh);
     for (int64_t i = 0; i < pair->surface.n; i++)
         itself = itself || pair->of[i] == (UZ_OF_ON | UZ_OF_WITH);
     for (int64_t z = 0; z < count; z++)
@@ -485,16 +477,6 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
     return good ? n : -1;
 }
 
-/* Twice the distance of the farthest node from the middle, which is the same however the body is turned. */
-static double size_of(const uz_mesh *mesh)
-{
-    double mean[3], most = 0;
-    middle_of(mean, mesh);
-    for (int64_t i = 0; i < mesh->n_nodes; i++)
-        most = fmax(most, uz_distance2(mesh->xyz + i * mesh->dim, mean, mesh->dim));
-    return 2 * sqrt(most);
-}
-
 /* The finer of two zones where they face each other is the slave, unless it alone is bound. Looked at only where the
  * two are hardly farther from each other than at their nearest: what is farther away touches late or never, however
  * fine it is. */
@@ -502,7 +484,7 @@ static bool rank_zones(uz_contact_sites *sites, const bool *bound, uz_mortar_pai
 {
     sample *s = NULL;
     const int64_t n = take_samples(&s, pair, sites->zone, n_zones);
-    const double reach = UZ_CANDIDATES_REACH * size_of(&pair->in->model->mesh);
+    const double reach = UZ_CANDIDATES_REACH * uz_mesh_size(&pair->in->model->mesh);
     int64_t pairs = 0;
     if (n > 0)
         qsort(s, (size_t)n, sizeof *s, by_zones);

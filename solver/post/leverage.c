@@ -212,8 +212,8 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
 {
     const int64_t most_holders = scene->n_supports + scene->n_contacts;
     /* h / L, and the least distance that counts: next to each other, supports are as stiff as a sector between them */
-    const double slender = sqrt(5 * buckling), thick = slender * model->mesh.extent,
-                 least = sqrt(slender / 3) * model->mesh.extent;
+    const double size = uz_mesh_size(&model->mesh), slender = sqrt(5 * buckling), thick = slender * size,
+                 least = sqrt(slender / 3) * size;
     const double force = largest_force(scene, e);
     double most = 0;
     int64_t n = 0;

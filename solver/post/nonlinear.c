@@ -183,7 +183,7 @@ static double flatness_in_plane(const uz_mesh *mesh)
             area += 0.5 * (x[0] * y[1] - x[1] * y[0]);
         }
     }
-    const double flat = area / (mesh->extent * mesh->extent);
+    const double size = uz_mesh_size(mesh), flat = area / (size * size);
     return flat * flat;
 }
 

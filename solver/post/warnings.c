@@ -185,8 +185,8 @@ static bool may_be_nonlinear(const doubts *d, double buckling, double leverage)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const bool ring = d->model->kind == UZ_AXISYMMETRIC;
-    const double U = d->out->strain_energy, extent = mesh->extent;
-    double stiffest = 0, depth = mesh->dim == 3 ? extent : d->model->thickness, around = 0;
+    const double U = d->out->strain_energy, size = uz_mesh_size(mesh);
+    double stiffest = 0, depth = mesh->dim == 3 ? size : d->model->thickness, around = 0;
     for (int64_t k = 0; k < d->model->n_materials; k++)
         stiffest = fmax(stiffest, uz_most_stiffness(d->model->materials[k].lame));
     for (int64_t i = 0; ring && i < mesh->n_nodes; i++) {
@@ -194,7 +194,7 @@ static bool may_be_nonlinear(const doubts *d, double buckling, double leverage)
         depth = fmax(depth, 2 * acos(-1) * r);
         around = fmax(around, r > 0 ? fabs(d->u[2 * i]) / r : 0); /* on the axis it is a slope */
     }
-    const double most = sqrt(stiffest * extent * extent * depth);
+    const double most = sqrt(stiffest * size * size * depth);
     const double least = 0.25 * fmin(UZ_SURELY_SMALL, leverage > 0 ? UZ_SURELY_HELD / (leverage * most) : INFINITY);
     const double steep = 0.25 * fmin(UZ_SURELY_SMALL * buckling, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
     return U > 0 && (around > steep || is_steep(d, steep));

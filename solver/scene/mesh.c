@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -97,6 +98,22 @@ const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
 {
     *count = (int)(mesh->first[element + 1] - mesh->first[element]);
     return mesh->node + mesh->first[element];
+}
+
+void uz_mesh_middle(double middle[3], const uz_mesh *mesh)
+{
+    memset(middle, 0, 3 * sizeof *middle);
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
+        middle[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
+}
+
+double uz_mesh_size(const uz_mesh *mesh)
+{
+    double middle[3], most = 0;
+    uz_mesh_middle(middle, mesh);
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        most = fmax(most, uz_distance2(mesh->xyz + i * mesh->dim, middle, mesh->dim));
+    return 2 * sqrt(most);
 }
 
 void uz_mesh_list_around(int64_t *first, int64_t *around, const uz_mesh *mesh)

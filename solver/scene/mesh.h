@@ -39,7 +39,7 @@ typedef struct {
     int64_t *node;
     bool uniform; /* every element is a box of size `cell` and of one kind: they share one stiffness matrix */
     double cell[3];
-    double extent;    /* diagonal of the bounding box */
+    double extent;    /* diagonal of the bounding box along the axes: for tolerances */
     int64_t n_unused; /* nodes of a file that no element uses: left out, and the others numbered anew in their order */
     int64_t n_given;  /* refined (bisect.h, subdivide.h): nodes from this one on lie amid others, ... */
     int64_t *from_first; /* ... node i amid those at from_first[i - n_given] to before from_first[i - n_given + 1] of */
@@ -95,6 +95,10 @@ static inline bool uz_mesh_hangs(const uz_mesh *mesh, int64_t node)
 
 /* The nodes of an element; *count of them. */
 const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count);
+/* The mean place of all nodes, and twice the distance of the farthest one from there: a size that does not depend on
+ * how the body stands, as `extent` does. */
+void uz_mesh_middle(double middle[3], const uz_mesh *mesh);
+double uz_mesh_size(const uz_mesh *mesh);
 /* The elements around each node, ascending: around[first[node]] up to before first[node + 1]. first: n_nodes + 1;
  * around: as many as all elements have nodes. */
 void uz_mesh_list_around(int64_t *first, int64_t *around, const uz_mesh *mesh);

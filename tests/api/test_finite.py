@@ -396,6 +396,20 @@ def test_a_body_between_another_and_a_plane(s):
     check(summary["outcome"] == "converged" and summary["resultants"]["contacts"][1]["force"][1] > 0.01, summary)
 
 
+def test_what_is_compared_does_not_depend_on_how_a_body_stands(s):
+    """A block that is pulled so little that it is not compared, and one that is, by as much as it stands along the axes or across them: the box
+    around the body made it half as stocky at 45 degrees."""
+    for pull, compared in ((0.006, False), (0.03, True)):
+        for angle in (0, 30, 45, 90):
+            c, d = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+            turn = lambda x, y: [c * x - d * y, d * x + c * y]
+            request = body(("quad4",), [(8, 4)], [lambda x, y: turn(2 * x, y)], {"foot": [(0, "left")], "head": [(0, "right")]}, model="plane_strain", kinematics="auto",
+                           materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}], supports=[{"on": "foot", "ux": 0, "uy": 0}],
+                           loads=[{"on": "head", "traction": turn(pull, 0)}])
+            small = s.solved(request, "converged")["summary"].get("small_deformation")
+            check(bool(small) == compared, pull, angle, small)
+
+
 def test_what_a_comparison_takes_is_predicted(s):
     """By ?validate=true, within a fifth of what is counted: of finite kinematics, and of auto where it compares."""
     cube = block(model="solid", mesh={"box": {"size": [1, 1, 1], "cells": [10, 10, 10]}}, supports=[{"on": "top", "ux": 0, "uy": -0.2, "uz": 0}],
