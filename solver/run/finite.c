@@ -44,17 +44,22 @@ bool uz_is_finite(const uz_problem *problem)
 
 /* ---- what is refused */
 
-uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err)
+uz_status uz_check_finite_settings(const uz_settings *settings, uz_error *err)
 {
-    if (settings->guaranteed || (!uz_is_mesh_chosen(problem) && (settings->total_error > 0 || settings->balanced)))
+    if (settings->guaranteed)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/accuracy",
                        "where kinematics are finite the error of the mesh is told by estimate, but not bounded: leave "
-                       "guaranteed out, and ask for a quantity or for a relative_error of the equations, or refine "
-                       "the mesh");
+                       "guaranteed out");
     if (settings->stopping == UZ_STOP_PAPER)
         return uz_fail(err, UZ_ERR_SCENE, "/solver/stopping",
                        "finite kinematics end by their certificate; leave stopping out");
     return UZ_OK;
+}
+
+void uz_judge_finite(uz_result *result, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks)
+{
+    uz_judge_whole_error(result, problem, settings, NULL, hooks, 0);
+    uz_judge_quantity(result);
 }
 
 /* ---- parts of the load */
@@ -258,6 +263,8 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     run->hooks.begins = NULL;
     run->hooks.progress = NULL; /* steps of contact problems, and there are many of these */
     run->requested = fmax(LEAST_ERROR, uz_requested_error(settings));
+    run->balanced = settings->balanced;
+    run->settings.balanced = false;
     run->settings.relative_error = fmin(STEP_ERROR, run->requested);
     run->settings.semidefinite = false;
     const bool copied = copy_lists(&run->scene, &one->scene, run->from);
@@ -562,11 +569,11 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
-        status = uz_check_finite_settings(problem, settings, err);
+        status = uz_check_finite_settings(settings, err);
     if (status == UZ_OK)
         status = uz_solve_finite_near(results, problem, settings, NULL, hooks, err);
     for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1) && status == UZ_OK; i++)
-        uz_judge_quantity(results[i]);
+        uz_judge_finite(results[i], problem, settings, hooks);
     return status;
 }
 

@@ -62,7 +62,10 @@ void uz_finite_point_free(uz_finite_point *point);
 uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
                                const uz_hooks *hooks, double deadline, const uz_result *small,
                                const uz_finite_path *path, uz_error *err);
-uz_status uz_check_finite_settings(const uz_problem *problem, const uz_settings *settings, uz_error *err);
+uz_status uz_check_finite_settings(const uz_settings *settings, uz_error *err);
+/* Of an answer on a mesh that is given: converged is mesh_limit where the whole error, or a quantity, is not known as
+ * well as was asked. */
+void uz_judge_finite(uz_result *result, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks);
 
 /* A displacement, and what follows from it. Its rows are those of the body there. Free dofs of rigid groups are steps
  * from there: 0 here. */
@@ -104,7 +107,8 @@ struct uz_finite_point {
 typedef struct {
     const uz_problem *problem; /* of one case */
     uz_settings settings;      /* of the contact problems */
-    double requested;          /* error of the answer */
+    double requested;          /* error of the answer; ... */
+    bool balanced;             /* ... of which a tenth of the mesh's is enough */
     uz_hooks hooks;
     double deadline;
     uz_cache *cache;    /* of tangents: their ordering is found once */

@@ -19,6 +19,8 @@
 
 /* An obstacle that stands deeper in a side between rows than this part of its length: rows leave 0.01 at most. */
 #define CUTS_IN 0.03
+/* What equations may have of the mesh's error in a balanced answer. */
+#define OF_MESH 0.1
 
 static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double tried)
 {
@@ -198,6 +200,19 @@ static uz_status mesh_error(double *error, const uz_finite_run *run, uz_error *e
     return asked ? status : UZ_OK;
 }
 
+/* A balanced answer's equations may have a tenth of the mesh's error, and were solved as well as if it were exact. */
+static void balance(uz_summary *s, const uz_finite_run *run)
+{
+    const double share = OF_MESH * s->discretization_error;
+    if (!run->balanced || !(share > s->requested_error))
+        return;
+    s->requested_error = fmin(1, share);
+    if (s->outcome == UZ_PRECISION_LIMIT && s->finite.residual <= s->requested_error) {
+        s->outcome = UZ_CONVERGED;
+        s->message[0] = '\0';
+    }
+}
+
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
 {
     uz_result *result = uz_alloc_zero(1, sizeof *result);
@@ -216,6 +231,7 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
     if (status == UZ_OK)
         status = mesh_error(&result->summary.discretization_error, run, err);
     if (status == UZ_OK) {
+        balance(&result->summary, run);
         uz_doubt_mesh(result, &run->at.rows, &run->scene);
         status = uz_finite_quantities(result, run, err);
     }

@@ -193,7 +193,7 @@ static uz_status check(const search *g, const uz_state *const *starts, uz_error 
     if (status == UZ_OK)
         status = uz_check_problem(g->problem, err);
     if (status == UZ_OK && uz_is_finite(g->problem))
-        status = uz_check_finite_settings(g->problem, g->settings, err);
+        status = uz_check_finite_settings(g->settings, err);
     if (status == UZ_OK && g->settings->stopping == UZ_STOP_PAPER)
         status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the paper's rule bounds no error that a mesh could be chosen by");
     for (int64_t i = 0; status == UZ_OK && starts && i < g->n_cases; i++)

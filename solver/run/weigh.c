@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "post/balance.h"
 #include "run/problem.h"
-#include "run/results.h"
 #include "run/settings.h"
 #include "run/solve.h"
 #include "scene/scene.h"
@@ -149,7 +148,7 @@ static uz_status choose(uz_result **result, const uz_problem *one, const uz_sett
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;
     left = enough ? *result : large;
-    uz_judge_quantity(large);
+    uz_judge_finite(large, one, settings, hooks);
     left->summary.small = large->summary.small;
     count_both(&left->summary, enough ? &large->summary : &(*result)->summary);
     uz_result_free(enough ? large : *result);
@@ -259,7 +258,7 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
-        status = uz_check_finite_settings(problem, settings, err);
+        status = uz_check_finite_settings(settings, err);
     if (status != UZ_OK)
         return status;
     return uz_is_mesh_chosen(problem) ? solve_chosen(results, problem, settings, starts, cache, hooks, err)

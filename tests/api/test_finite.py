@@ -466,6 +466,22 @@ def test_a_mesh_is_refined(s):
     check(true < 0.1, true, coarser["error"])
 
 
+def test_levels_of_accuracy_on_a_mesh_that_is_given(s):
+    """Balanced asks for a tenth of the mesh's error, and a whole error that the mesh does not have ends as mesh_limit."""
+    roller = {"mesh": {"box": {"size": [4, 1], "cells": [16, 4]}}, "supports": [{"on": "top", "ux": 0.5, "uy": -0.2}],
+              "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [1, -2], "radius": 2}}}]}
+    for kinematics in ("finite", "auto"):
+        told = {}
+        for name, accuracy in (("precise", "precise"), ("balanced", "balanced"), ("enough", {"total": 0.3}), ("less", {"total": 0.01})):
+            told[name] = s.solve({**block(kinematics=kinematics, **roller), "solver": {"accuracy": accuracy}})["summary"]
+            check("finite" in told[name], name, told[name]["outcome"])
+            check(told[name]["outcome"] == ("mesh_limit" if name == "less" else "converged"), kinematics, name, told[name]["outcome"], told[name]["message"])
+        mesh = told["precise"]["error"]["mesh"]
+        check(0.05 < mesh < 0.3 and abs(told["balanced"]["requested_error"] / mesh - 0.1) < 1e-6, mesh, told["balanced"]["requested_error"])
+        check(abs(told["balanced"]["contact"]["force"][1] / told["precise"]["contact"]["force"][1] - 1) < 1e-7, told["balanced"]["contact"])
+        check("the whole error is about" in told["less"]["message"] and told["enough"]["error"]["total"] < 0.3, told["less"]["message"])
+
+
 def test_bodies_that_contact_alone_holds_are_stabilized(s):
     """By springs whose forces are told: the closed form of a block that nothing holds aside, and a block in a bowl that is pressed by a load
     alone, which a symmetric half of both tells."""
@@ -503,8 +519,7 @@ def test_what_is_not_modelled_is_refused(s):
              (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
-               "/solver/accuracy", "leave guaranteed out"),
-              ({**block(), "solver": {"accuracy": {"total": 0.1}}}, "/solver/accuracy", "refine the mesh")]
+               "/solver/accuracy", "leave guaranteed out")]
     large = {"model": "solid", "mesh": {"box": {"size": [1, 1, 1], "cells": [20, 20, 20]}}, "supports": [{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}],
              "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]}
     for kinematics in ("auto", "finite"):

@@ -854,7 +854,7 @@ TEST(what_there_is_no_model_for_is_refused)
             problem.scene.contacts[0].kind = k == 4 ? UZ_OBSTACLE_HEIGHT : UZ_OBSTACLE_PLANE;
         }
         settings.stopping = k == 1 ? UZ_STOP_PAPER : UZ_STOP_CERTIFIED;
-        settings.balanced = k == 2;
+        settings.guaranteed = k == 2;
         CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_ERR_SCENE);
         CHECK_STR(err.where, WHERE[k]);
         CHECK(!result);
