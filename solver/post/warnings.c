@@ -214,17 +214,17 @@ static void look_at_turns(const doubts *d)
     }
 }
 
-/* Of some scenes there is no answer of finite strain that this one could be compared with. */
+/* Of materials with directions there is no answer of finite strain that this one could be compared with. */
 static void look_at_small_only(const doubts *d)
 {
-    const bool partly = d->model->n_rigid > 0 && !uz_has_finite_model(d->scene);
-    const char *what = partly ? "rigid groups of which one rotation is held" : NULL;
+    bool general = false;
     for (int64_t k = 0; k < d->model->n_materials; k++)
-        what = d->model->materials[k].lame.general ? "orthotropic materials" : what;
-    if (what && d->out->nonlinear > UZ_MOST_SLIDING)
+        general = general || d->model->materials[k].lame.general;
+    if (general && d->out->nonlinear > UZ_MOST_SLIDING)
         warn(d->out, "large_deformation", d->out->nonlinear,
-             "small deformation errs by some %.2g %% as rotations are large, and %s have no other: put less load on it",
-             100 * d->out->nonlinear, what);
+             "small deformation errs by some %.2g %% as rotations are large, and orthotropic materials have no other: "
+             "put less load on it",
+             100 * d->out->nonlinear);
 }
 
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
