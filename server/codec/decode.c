@@ -4,6 +4,7 @@
 #include "codec/text.h"
 #include "run/problem.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,19 +135,26 @@ static bool check_limits(const codec_request *request, problem_details *problem)
     return true;
 }
 
+bool codec_request_is_light(const codec_request *request)
+{
+    enum { MOST_NODES = 100000, USUAL_PARTS = 10 };
+    const uz_scene *scene = &request->problem.scene;
+    const uz_box *box = &scene->box;
+    const bool is_box = scene->source == UZ_MESH_BOX;
+    const int64_t parts = scene->n_selections + scene->n_supports + scene->n_loads + scene->n_contacts;
+    double nodes = is_box ? 1 : (double)scene->given.n_nodes;
+    for (int i = 0; is_box && i < box->dim; i++)
+        nodes *= (double)box->cells[i] + 1.0;
+    return request->problem.kind != UZ_PROBLEM_SCENE || nodes * fmax(1.0, (double)parts / USUAL_PARTS) <= MOST_NODES;
+}
+
 /* What the solver would refuse a scene for, as far as that takes milliseconds: mesh, materials, supports, loads and
  * contacts, and motions that neither supports nor obstacles stop, but nothing of K. Whether loads press the body on
  * what would hold it is left to the run, and so are large meshes and the loads of cases but the first. */
 static bool check_scene(const codec_request *request, problem_details *problem)
 {
-    enum { MOST_NODES = 100000 };
     const uz_problem *p = &request->problem;
-    const uz_box *box = &p->scene.box;
-    const bool is_box = p->scene.source == UZ_MESH_BOX;
-    double nodes = is_box ? 1 : (double)p->scene.given.n_nodes;
-    for (int i = 0; is_box && i < box->dim; i++)
-        nodes *= (double)box->cells[i] + 1.0;
-    if (p->kind != UZ_PROBLEM_SCENE || p->scene.refine || nodes > MOST_NODES)
+    if (p->kind != UZ_PROBLEM_SCENE || p->scene.refine || !codec_request_is_light(request))
         return true;
     uz_error err = {.status = UZ_OK};
     const uz_scene first = uz_scene_of_case(p, 0);
@@ -160,15 +168,16 @@ static bool check_scene(const codec_request *request, problem_details *problem)
     return false;
 }
 
-/* Vectors that came with the request, as long as the problem wants them. */
-static bool check_sizes(const codec_request *request, problem_details *problem)
+/* Vectors that came with the request, as long as the problem wants them. Of a large scene that is looked at where it is
+ * read for its run. */
+static bool check_sizes(const codec_request *request, bool stored, problem_details *problem)
 {
     const codec_answer *answer = &request->answer;
     const codec_start *start = &request->start;
     const bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
     const int dim = uz_scene_dim(&request->problem.scene);
     int64_t m, n_u;
-    if (!answer->u && !start->reactions)
+    if ((!answer->u && !start->reactions) || !(stored || codec_request_is_light(request)))
         return true;
     if (!codec_request_sizes(request, &m, &n_u, problem))
         return false;
@@ -309,7 +318,7 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
     request.n_uploads = d.n_uploads;
     json_clear(&tree);
     good = good && (kind == CODEC_STORED || (check_limits(&request, problem) && check_scene(&request, problem))) &&
-           check_sizes(&request, problem);
+           check_sizes(&request, kind == CODEC_STORED, problem);
     if (good)
         *out = request;
     else

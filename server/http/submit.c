@@ -48,8 +48,8 @@ static store_request kept_request(const api *context, const http_request *rq, co
     const uint64_t held = store_is_shared(context->store) ? work_body(body, len) : 0;
     for (int i = 0; p->kind == UZ_PROBLEM_SCENE && i < p->scene.box.dim; i++)
         cells *= (double)p->scene.box.cells[i];
-    const bool small = cells <= SMALL_DOFS && codec_request_sizes(request, &m, &n_u, &ignored) &&
-                       n_u <= SMALL_DOFS / cases && m <= SMALL_ROWS;
+    const bool small = cells <= SMALL_DOFS && codec_request_is_light(request) &&
+                       codec_request_sizes(request, &m, &n_u, &ignored) && n_u <= SMALL_DOFS / cases && m <= SMALL_ROWS;
     return (store_request){.client = rq->client,
                            .share = rq->share,
                            .small = small,
@@ -190,6 +190,8 @@ static bool check_reactions(api *context, const codec_request *request, problem_
         return refuse_store(context, start, status, problem);
     if (!finite)
         return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: this job ended without reactions");
+    if (!codec_request_is_light(request)) /* the run looks at it */
+        return true;
     if (!codec_request_sizes(request, &m, &n_u, problem))
         return false;
     if (count == m)

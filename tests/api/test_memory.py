@@ -7,6 +7,8 @@ import contextlib
 import copy
 import http.client
 import os
+import pathlib
+import re
 import threading
 import time
 
@@ -95,6 +97,24 @@ def ratios(costs):
 def free_memory_held(s):
     with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
         return next(int(line.split()[1]) for line in file if line.startswith("RssAnon")) / 1024
+
+
+@options("--workers", "1")
+def test_a_short_text_of_many_parts(s):
+    """Each of its contacts may touch all of the boundary: rows by the million. They are made where memory has a bound,
+    not in the daemon, and what they tell of the request is told there."""
+    def most():
+        return int(re.search(r"VmHWM:\s*(\d+) kB", pathlib.Path(f"/proc/{s.process.pid}/status").read_text())[1]) >> 10
+    body = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [10, 10, 1], "cells": [60, 60, 1]}},
+                        "materials": [{"on": "all", "young": 5, "poisson": 0.3}],
+                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "top", "pressure": 0.1}],
+                        "contacts": [{"on": "boundary", "obstacle": {"plane": {"point": [0, 0, -2 - k], "normal": [0, 0, 1]}}}
+                                     for k in range(200)]},
+            "solver": {"warm_start": {"reactions": [0.0] * 5}}}
+    before = most()
+    job = s.post(body, {"Prefer": "wait=60"})
+    check(most() < before + 50, "MB of the daemon", before, most())
+    check(job.status == 200 and job.json["error"]["code"] == "size_mismatch", job)
 
 
 @options("--workers", "1")
