@@ -3,6 +3,7 @@
 #include "local/contexts.h"
 #include "request/build.h"
 #include "session/find_job.h"
+#include "text/streams.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -116,6 +117,7 @@ int main(int argc, char **argv)
 {
     char message[256];
     client_options options;
+    uz_hold_standard_streams();
     json_set_alloc_funcs(allocate_or_end, free);
     if (!client_arguments_parse(&options, argc, argv, getenv("UZAWA_SERVER"), message, sizeof message))
         return (int)complain_usage(message, &options);

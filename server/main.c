@@ -13,6 +13,7 @@
 #include "store/move.h"
 #include "store/nodes.h"
 #include "store/objects/objects.h"
+#include "text/streams.h"
 #include "uzawa.h"
 #include "work/solver_process.h"
 #include "work/webhook.h"
@@ -455,6 +456,7 @@ int main(int argc, char **argv)
     int64_t bytes = 0;
     if (argc > 1 && strcmp(argv[1], SOLVER_ROLE) == 0)
         return solver_process(argc, argv);
+    uz_hold_standard_streams();
     switch (options_read(&options, argc, argv, backup, message, sizeof message)) {
     case OPTIONS_HELP:
         options_usage(stdout);

@@ -103,6 +103,16 @@ def test_key_makes_a_repeat_safe(server):
     check(run(server, "submit", SPRINGS, code=0).stdout not in ids, "without a key each submit is a job")
 
 
+def test_closed_standard_output(server):
+    """The connection does not get its number, so that what is printed is no part of a request."""
+    submit(server, service.SCENE, "--wait")
+    for words in ("plot", "@last"), ("result", "@last"), ("list",):
+        with open(os.devnull, "wb") as nowhere:
+            done = subprocess.run([CLIENT, "--server", server.url, *words], stdout=nowhere, stderr=subprocess.PIPE,
+                                  preexec_fn=lambda: os.close(1), check=False, timeout=90)
+        check(done.returncode == 11 and b"cannot write to standard output" in done.stderr, words, done)
+
+
 def test_result_goes_to_a_file(server):
     job = run(server, "submit", PAPER, "--wait", "--quiet", code=0).stdout.strip()
     target = os.path.join(server.folder, "result.json")

@@ -8,7 +8,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, Skip, check, expect, options
+from service import ENDLESS, MATRICES, SCENE, Skip, check, expect, options, wait_until
 
 # ------------------------------------------------------------------ process
 
@@ -121,6 +121,30 @@ def test_command_line(s):
     check(got.returncode == 2 and "did you mean --listen?" in got.stderr, got)
     got = run(s, "--qqqqqqqqqqqqq")
     check(got.returncode == 2 and "unknown option --qqqqqqqqqqqqq\n" in got.stderr, got)
+
+
+@options(None)
+def test_closed_standard_streams(s):
+    """What is printed and logged goes nowhere then, not into the file of jobs, which would be the next to be opened."""
+    file = s.file()
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        s.host, s.port = free.getsockname()
+    command = s.command("--listen", f"127.0.0.1:{s.port}", "--db", file)
+    with subprocess.Popen(command, preexec_fn=lambda: os.closerange(0, 3)) as daemon:
+        try:
+            wait_until(lambda: daemon.poll() is not None or os.path.exists(file) and answers(s))
+            check(s.solve(MATRICES)["status"] == "successful")
+        finally:
+            daemon.kill()
+    with open(file, "rb") as text:
+        check(text.read(16) == b"SQLite format 3\0", "the file of jobs was written over")
+
+
+def answers(s):
+    try:
+        return s.get("/healthz").status == 200
+    except OSError:
+        return False
 
 
 @options(None)

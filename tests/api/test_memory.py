@@ -107,8 +107,9 @@ def test_a_short_text_of_many_parts(s):
         return int(re.search(r"VmHWM:\s*(\d+) kB", pathlib.Path(f"/proc/{s.process.pid}/status").read_text())[1]) >> 10
     body = {"problem": {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [10, 10, 1], "cells": [60, 60, 1]}},
                         "materials": [{"on": "all", "young": 5, "poisson": 0.3}],
-                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "top", "pressure": 0.1}],
-                        "contacts": [{"on": "boundary", "obstacle": {"plane": {"point": [0, 0, -2 - k], "normal": [0, 0, 1]}}}
+                        "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}],
+                        "loads": [{"on": "top", "pressure": 0.1}],
+                        "contacts": [{"on": "boundary", "obstacle": {"sphere": {"center": [0, 0, -9 - k], "radius": 5}}}
                                      for k in range(200)]},
             "solver": {"warm_start": {"reactions": [0.0] * 5}}}
     before = most()
