@@ -8,7 +8,7 @@ import shutil
 import subprocess
 
 import service
-from service import MATRICES, SCENE, Skip, check, expect, options
+from service import MATRICES, SCENE, Skip, check, expect, options, wait_until
 
 
 def run(s, *arguments, **environment):
@@ -215,7 +215,8 @@ def test_limits_on_the_problem(s):
 def test_a_job_over_its_time_ends_and_others_go_on(s):
     job = s.solve(service.ENDLESS)
     check(job["status"] == "successful" and job["summary"]["outcome"] == "time_limit", job)
-    check(s.solve(MATRICES)["summary"]["outcome"] == "converged")
+    # Beside much else even that is over its second at times.
+    wait_until(lambda: (s.solve(MATRICES)["summary"] or {}).get("outcome") == "converged")
 
 
 @options("--access-log", "no")

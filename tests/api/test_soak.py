@@ -59,9 +59,10 @@ def test_faults_of_daemons_and_database(s):
 
 @options(None)
 def test_jobs_of_many_bodies(s):
-    """By chance three daemons would factor most bodies two or three times."""
-    run = daemons.mixture(s.build, 5, 60, 10, [10, 10, 6], "256M", clients=6)
-    check(run["errors"] == 0 and run["missed"] <= 1.4 * run["asked"], run)
+    """By chance three daemons factor most bodies two or three times. How often one does that another has made is left to
+    the pace of the machine: a job waits for its factor as long as making one takes."""
+    near, far = (daemons.mixture(s.build, wait_s, 60, 10, [10, 10, 6], "256M", clients=6) for wait_s in (5, 0))
+    check(near["errors"] == 0 and near["missed"] <= 0.8 * far["missed"], near, far)
 
 
 @options(None)
