@@ -271,14 +271,14 @@ def test_long_polls_wake(s):
                 expect(delete(s, job_id), 200)
                 time.sleep(0.5)
             return None
-        reply = expect(s.get(f"/v1/jobs/{watched[i]}", Prefer="wait=30"), 200)
+        reply = expect(s.get(f"/v1/jobs/{watched[i]}", Prefer="wait=60"), 200)
         return reply.json, time.monotonic()
     for i, result in enumerate(together(len(watched) + 1, work)[:-1]):
         job, when = result
         wanted = "successful" if watched[i] == third else "dismissed"
         check(job["id"] == watched[i] and job["status"] == wanted, job)
         cause = woke[first if watched[i] == third else watched[i]]
-        check(0 <= when - cause < 5, watched[i], "woke", when - cause, "s after its cause")
+        check(0 <= when - cause < 40, watched[i], "woke", when - cause, "s after its cause, not after what it was to wait")
 
 
 @options("--workers", "2")
