@@ -346,4 +346,21 @@ def test_a_large_body_is_loaded_when_it_is_asked_for(s, b):
     b.wait("a picture", "return document.querySelector('#body img, #body canvas, #body svg')")
 
 
+def test_names_as_long_as_they_may_be_fit_a_phone(s, b):
+    """Of a job, a tag, a group and cases, none of which has a place to break."""
+    body = copy.deepcopy(SCENE)
+    body["problem"]["groups"] = [{"name": "g" * 63, "where": {"y": 0}}]
+    body["problem"]["contacts"][0]["on"] = "g" * 63
+    body |= {"name": "n" * 63, "tags": ["t" * 60],
+             "cases": [{"name": c * 63, "loads": [{"on": "right", "traction": [0.2, 0]}]} for c in "ab"]}
+    job = s.solved(body)["id"]
+    b.size(360, 740, phone=True)
+    b.open(s, f"jobs/{job}")
+    b.wait("the cases", "return document.querySelector('#case') && document.querySelector('#convergence .legend .key')")
+    wide = b.run("""const hides = (e) => e && (getComputedStyle(e).overflowX !== 'visible' || hides(e.parentElement));
+        return [...document.querySelectorAll('main *')].map((e) => [e, e.getBoundingClientRect().right])
+            .filter(([e, right]) => right > 361 && !hides(e.parentElement)).map(([e, right]) => `${e.tagName} ${e.id} ${right}`)""")
+    check(not wide, wide)
+
+
 browser.main(globals())
