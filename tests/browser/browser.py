@@ -141,8 +141,15 @@ class Browser:
         """The PNG bytes of the page as it is in sight, or of an element."""
         if selector is None:
             return base64.b64decode(self.command("Page.captureScreenshot", format="png")["data"])
-        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
-        return self.one(selector).screenshot_as_png
+        place = """const e = document.querySelector(arguments[0]);
+            e.scrollIntoView({block: 'center'});
+            return JSON.stringify(e.getBoundingClientRect())"""
+        for _ in range(20):  # what comes above it meanwhile moves it
+            before = self.run(place, selector)
+            png = self.one(selector).screenshot_as_png
+            if self.run(place, selector) == before:
+                break
+        return png
 
     def pixels(self, selector=None):
         """{colour: how many} of the page in sight, or of an element; colours are (r, g, b)."""
