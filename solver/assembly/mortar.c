@@ -114,14 +114,8 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
 
 bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
 {
-    if (points->n == points->room) {
-        const int64_t room = 2 * points->room + 256;
-        uz_mortar_point *grown = uz_realloc(points->point, room, sizeof *grown);
-        if (!grown)
-            return false;
-        points->point = grown;
-        points->room = room;
-    }
+    if (!uz_grow(&points->point, points->n, 1, &points->room, sizeof *points->point))
+        return false;
     points->point[points->n++] = *p;
     return true;
 }
@@ -300,15 +294,8 @@ static bool integrate(integrals *of, uz_contact_sites *sites, uz_mortar_pair *pa
         }
         if (sites->n_zones == 2 && sites->n_ranks == 1 && sites->zone[i] == sites->rank[1])
             continue; /* the master of all that it faces */
-        bool good = uz_mortar_find_slave_points(pair, sites, i);
-        const uz_mortar_points *points = &pair->points;
-        if (points->n * UZ_FACE_NODES > room) {
-            double *grown = uz_realloc(A, UZ_FACE_NODES * points->room, sizeof *grown);
-            good = grown != NULL;
-            A = grown ? grown : A;
-            room = UZ_FACE_NODES * points->room;
-        }
-        if (good && add_side(of, sites, pair, i, A))
+        if (uz_mortar_find_slave_points(pair, sites, i) &&
+            uz_grow(&A, 0, UZ_FACE_NODES * pair->points.n, &room, sizeof *A) && add_side(of, sites, pair, i, A))
             continue;
         free(A);
         return false;

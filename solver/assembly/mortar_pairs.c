@@ -452,12 +452,7 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
         if (n_zones == 2 && z == 1 && n > 0)
             break; /* the other one has told */
         for (int64_t k = start[z]; k < start[z + 1] && good; k += 1 + (start[z + 1] - start[z]) / LOOKED_AT) {
-            good = uz_mortar_find_points(pair, list[k]);
-            if (good && n + pair->points.n > room) {
-                sample *grown = uz_realloc(*out, room = 2 * room + pair->points.n, sizeof *grown);
-                good = grown != NULL;
-                *out = grown ? grown : *out;
-            }
+            good = uz_mortar_find_points(pair, list[k]) && uz_grow(out, n, pair->points.n, &room, sizeof **out);
             for (int64_t g = 0; g < pair->points.n && good; g++) {
                 const uz_mortar_point *p = &pair->points.point[g];
                 const int64_t other = zone[p->master];
@@ -532,13 +527,8 @@ typedef struct {
 
 static bool add_two(pair_list *list, int64_t a, int64_t b)
 {
-    if (list->n == list->room) {
-        int64_t(*grown)[2] = uz_realloc(list->pair, 2 * list->room + 256, sizeof *grown);
-        if (!grown)
-            return false;
-        list->pair = grown;
-        list->room = 2 * list->room + 256;
-    }
+    if (!uz_grow(&list->pair, list->n, 1, &list->room, sizeof *list->pair))
+        return false;
     list->pair[list->n][0] = a;
     list->pair[list->n++][1] = b;
     return true;

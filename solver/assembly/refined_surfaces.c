@@ -43,14 +43,8 @@ typedef struct {
 
 static bool put(refined *x, int64_t node, int64_t surface, int64_t side, const double local[2])
 {
-    if (x->n == x->room) {
-        const int64_t room = 2 * x->room + 256;
-        entry *grown = uz_realloc(x->item, room, sizeof *grown);
-        if (!grown)
-            return false;
-        x->item = grown;
-        x->room = room;
-    }
+    if (!uz_grow(&x->item, x->n, 1, &x->room, sizeof *x->item))
+        return false;
     x->item[x->n] = (entry){surface, side, x->last[node], {local[0], local[1]}};
     x->last[node] = x->n++;
     return true;

@@ -244,13 +244,8 @@ static bool slide_side(work *w, int64_t i, double **share, int64_t *most, slopes
     if (!uz_mortar_find_slave_points(pair, w->sites, i))
         return false;
     const uz_mortar_points *points = &pair->points;
-    if (points->n * NODES > *most) {
-        double *grown = uz_realloc(*share, points->n * NODES, sizeof *grown);
-        if (!grown)
-            return false;
-        *share = grown;
-        *most = points->n * NODES;
-    }
+    if (!uz_grow(share, 0, points->n * NODES, most, sizeof **share))
+        return false;
     if (points->n == 0 || !uz_mortar_shares(*share, D, pair, i))
         return true;
     uz_side_area_vector(across, &shape, centre);

@@ -13,14 +13,8 @@
 
 uz_status uz_obstacle_piece_add(uz_obstacle_pieces *out, const uz_obstacle_piece *piece, uz_error *err)
 {
-    if (out->n == out->room) {
-        const int64_t room = 2 * out->room + 16;
-        uz_obstacle_piece *at = uz_realloc(out->at, room, sizeof *at);
-        if (!at)
-            return uz_no_memory(err, "what is before a side");
-        out->at = at;
-        out->room = room;
-    }
+    if (!uz_grow(&out->at, out->n, 1, &out->room, sizeof *out->at))
+        return uz_no_memory(err, "what is before a side");
     out->at[out->n++] = *piece;
     return UZ_OK;
 }

@@ -31,8 +31,8 @@ typedef struct {
     int64_t *first, *around; /* elements around each node */
     int64_t *seen;           /* n_elements: 1 + the last patch that it was in */
     int64_t patches;
-    int64_t *patch; /* elements of the patch at hand; capacity of them */
-    int64_t count, capacity;
+    int64_t *patch; /* elements of the patch at hand; room for them */
+    int64_t count, room;
 } patches;
 
 static int32_t material_of(const patches *p, int64_t e)
@@ -47,13 +47,8 @@ static bool add_ring(patches *p, int64_t node, int32_t material)
         const int64_t e = p->around[i];
         if (p->seen[e] == p->patches || material_of(p, e) != material || !p->plain[e])
             continue;
-        if (p->count == p->capacity) {
-            int64_t *more = uz_realloc(p->patch, 2 * p->capacity + 64, sizeof *more);
-            if (!more)
-                return false;
-            p->patch = more;
-            p->capacity = 2 * p->capacity + 64;
-        }
+        if (!uz_grow(&p->patch, p->count, 1, &p->room, sizeof *p->patch))
+            return false;
         p->seen[e] = p->patches;
         p->patch[p->count++] = e;
     }

@@ -131,7 +131,7 @@ static bool has_edge(const bisection *x, const piece *part, int i, int j)
 
 static void await(bisection *x, int64_t e)
 {
-    if (uz_refinement_grow(&x->waits, &x->room_waits, x->n_waits, sizeof *x->waits))
+    if (uz_grow(&x->waits, x->n_waits, 1, &x->room_waits, sizeof *x->waits))
         x->waits[x->n_waits++] = e;
     else
         x->all.failed = true;
@@ -237,7 +237,7 @@ static void cut(bisection *x, int64_t e)
         }
         x->all.links[at].middle = add_node(x, from);
     }
-    if (x->all.failed || x->all.too_many || !uz_refinement_grow(&x->part, &x->room_parts, x->parts, sizeof *x->part)) {
+    if (x->all.failed || x->all.too_many || !uz_grow(&x->part, x->parts, 1, &x->room_parts, sizeof *x->part)) {
         x->all.failed = x->all.failed || !x->all.too_many;
         return;
     }
@@ -313,7 +313,7 @@ static void bisect(bisection *x, int64_t e)
     while (!(whole.split >> b & 1))
         b--;
     const int64_t na = whole.corner[a], nb = whole.corner[b], at = halve(x, na, nb, whole.quadratic);
-    if (x->all.failed || x->all.too_many || !uz_refinement_grow(&x->part, &x->room_parts, x->parts, sizeof *x->part)) {
+    if (x->all.failed || x->all.too_many || !uz_grow(&x->part, x->parts, 1, &x->room_parts, sizeof *x->part)) {
         x->all.failed = x->all.failed || !x->all.too_many;
         return;
     }

@@ -36,14 +36,8 @@ typedef struct {
 
 static bool append(number_list *list, int64_t value)
 {
-    if (list->count == list->room) {
-        const int64_t room = 2 * list->room + 64;
-        int64_t *grown = uz_realloc(list->value, room, sizeof *grown);
-        if (!grown)
-            return false;
-        list->value = grown;
-        list->room = room;
-    }
+    if (!uz_grow(&list->value, list->count, 1, &list->room, sizeof *list->value))
+        return false;
     list->value[list->count++] = value;
     return true;
 }

@@ -11,7 +11,9 @@ bool uz_refinement_begin(uz_refinement *x, uz_mesh *mesh)
 {
     x->mesh = mesh;
     x->dim = mesh->dim;
-    x->nodes = x->room_nodes = mesh->n_nodes;
+    x->nodes = mesh->n_nodes;
+    x->room_xyz = mesh->n_nodes * x->dim;
+    x->room_first = 1;
     x->xyz = uz_alloc(mesh->n_nodes * x->dim, sizeof *x->xyz);
     x->from_first = uz_alloc_zero(1, sizeof *x->from_first);
     x->failed = !x->xyz || !x->from_first;
@@ -42,47 +44,15 @@ uz_status uz_refinement_end(uz_refinement *x, bool listed, uz_error *err)
     return status;
 }
 
-bool uz_refinement_grow(void *array, int64_t *room, int64_t count, size_t size)
-{
-    void *items;
-    if (count < *room)
-        return true;
-    const int64_t more = *room + *room / 2 + 64;
-    memcpy(&items, array, sizeof items); /* a pointer to whatever it has */
-    items = uz_realloc(items, more, size);
-    if (!items)
-        return false;
-    memcpy(array, &items, sizeof items);
-    *room = more;
-    return true;
-}
-
 /* ---- nodes and links */
 
 static bool make_room(uz_refinement *x, int count)
 {
-    const int64_t old = x->mesh->n_nodes;
-    if (x->nodes >= x->room_nodes) {
-        const int64_t room = x->room_nodes + x->room_nodes / 2 + 64;
-        double *xyz = uz_realloc(x->xyz, room * x->dim, sizeof *xyz);
-        x->xyz = xyz ? xyz : x->xyz;
-        int64_t *first = xyz ? uz_realloc(x->from_first, room - old + 1, sizeof *first) : NULL;
-        x->from_first = first ? first : x->from_first;
-        if (!first)
-            return false;
-        x->room_nodes = room;
-    }
-    if (x->n_from + count > x->room_from) {
-        const int64_t room = x->room_from + x->room_from / 2 + 256;
-        int64_t *from = uz_realloc(x->from, room, sizeof *from);
-        x->from = from ? from : x->from;
-        double *share = from ? uz_realloc(x->from_share, room, sizeof *share) : NULL;
-        x->from_share = share ? share : x->from_share;
-        if (!share)
-            return false;
-        x->room_from = room;
-    }
-    return true;
+    const int64_t added = x->nodes - x->mesh->n_nodes;
+    return uz_grow(&x->xyz, x->nodes * x->dim, x->dim, &x->room_xyz, sizeof *x->xyz) &&
+           uz_grow(&x->from_first, added + 1, 1, &x->room_first, sizeof *x->from_first) &&
+           uz_grow(&x->from, x->n_from, count, &x->room_from, sizeof *x->from) &&
+           uz_grow(&x->from_share, x->n_from, count, &x->room_share, sizeof *x->from_share);
 }
 
 int64_t uz_refinement_node(uz_refinement *x, const int64_t *from, const double *share, int count)
@@ -155,7 +125,7 @@ int64_t uz_refinement_link(uz_refinement *x, const int64_t *corner, int corners)
             return *slot - 1;
         if (*slot)
             continue;
-        if (!uz_refinement_grow(&x->links, &x->room_links, x->n_links, sizeof *x->links)) {
+        if (!uz_grow(&x->links, x->n_links, 1, &x->room_links, sizeof *x->links)) {
             x->failed = true;
             return 0;
         }
@@ -167,7 +137,7 @@ int64_t uz_refinement_link(uz_refinement *x, const int64_t *corner, int corners)
 
 void uz_refinement_use(uz_refinement *x, int64_t link, int64_t element)
 {
-    if (x->failed || !uz_refinement_grow(&x->users, &x->room_users, x->n_users, sizeof *x->users)) {
+    if (x->failed || !uz_grow(&x->users, x->n_users, 1, &x->room_users, sizeof *x->users)) {
         x->failed = true;
         return;
     }
@@ -208,7 +178,7 @@ static bool refine_items(uz_group *out, const heirs *h, const uz_group *group, u
         const uz_element_type *type = uz_element_type_of((uz_element_kind)h->fine->kind[e]);
         const int64_t *node = h->fine->node + h->fine->first[e];
         const bool whole = group->kind == UZ_GROUP_ELEMENTS && h->has[h->root[e]];
-        if (whole && !uz_refinement_grow(&out->element, &room_elements, out->n_elements, sizeof *out->element))
+        if (whole && !uz_grow(&out->element, out->n_elements, 1, &room_elements, sizeof *out->element))
             return false;
         if (whole)
             out->element[out->n_elements++] = e;
@@ -217,7 +187,7 @@ static bool refine_items(uz_group *out, const heirs *h, const uz_group *group, u
         for (int s = 0; s < type->sides && group->kind == UZ_GROUP_FACES && h->has[h->root[e]]; s++) {
             if (!is_part_of(h, h->has, e, s))
                 continue;
-            if (!uz_refinement_grow(&out->face, &room_faces, out->n_faces, sizeof *out->face))
+            if (!uz_grow(&out->face, out->n_faces, 1, &room_faces, sizeof *out->face))
                 return false;
             out->n_inner += !is_part_of(h, h->outer_sides, e, s);
             out->face[out->n_faces++] = (uz_face){e, s};

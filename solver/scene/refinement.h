@@ -30,15 +30,13 @@ typedef struct {
     int64_t *from_first, *from; /* of the new nodes, as in uz_mesh */
     double *from_share;
     int64_t *table; /* by hash of their nodes: 1 + number of a link, 0: none */
-    int64_t nodes, n_links, n_users, n_from, slots, room_links, room_users, room_nodes, room_from;
+    int64_t nodes, n_links, n_users, n_from, slots;
+    int64_t room_links, room_users, room_xyz, room_first, room_from, room_share;
     bool failed, too_many; /* no memory; more unknowns than a scene may have */
 } uz_refinement;
 
 /* The nodes of the mesh. False: no memory. */
 bool uz_refinement_begin(uz_refinement *x, uz_mesh *mesh);
-
-/* Room for one more of `count` items; false: none. */
-bool uz_refinement_grow(void *array, int64_t *room, int64_t count, size_t size);
 
 /* A node amid others, of which each has a share in it that is not 0: its number. Without room it is 0, and x says so.
  */

@@ -224,7 +224,7 @@ static void divide(subdivision *x, int64_t e)
             if (link >= 0 && !x->all.failed)
                 x->all.links[link].whole = edge[k];
         }
-        if (at == x->count && !uz_refinement_grow(&x->cells, &x->room, x->count, sizeof *x->cells))
+        if (at == x->count && !uz_grow(&x->cells, x->count, 1, &x->room, sizeof *x->cells))
             x->all.failed = true;
         if (x->all.failed || x->all.too_many)
             return;
