@@ -65,24 +65,11 @@ static bool moves_something(const uz_body_model *model, const uz_contact_row *ro
     return false;
 }
 
-/* At most so many entries has a node. */
-static int64_t count_entries(const uz_body_model *model, int64_t node)
-{
-    const int64_t *from;
-    const double *share;
-    const int64_t carriers = uz_carriers(&from, &share, model, node);
-    if (carriers > 0)
-        return model->mesh.dim * carriers;
-    return model->mesh.dim * (uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &share, &model->mesh, node) : 1);
-}
-
-/* How many rows, and at most how many entries. */
-static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_model *model, const uz_scene *scene,
-                            uz_error *err)
+static uz_status count_rows(int64_t *most_places, uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     uz_contact_input in;
     uz_contact_row row;
-    *entries = *most_places = model->m = model->n_pair_rows = 0;
+    *most_places = model->m = model->n_pair_rows = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
         if (status != UZ_OK)
@@ -94,8 +81,6 @@ static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_mode
                 continue;
             model->m++;
             model->n_pair_rows += row.masters > 0 || row.slaves > 1;
-            for (int j = 0; j < row.slaves + row.masters; j++)
-                *entries += count_entries(model, j < row.slaves ? row.slave[j] : row.master[j - row.slaves]);
         }
         if (model->m > UZ_SCENE_MAX_DOFS)
             return uz_fail(err, UZ_ERR_SCENE, "/contacts", "more than %d contact candidates; use fewer contacts",
@@ -104,14 +89,14 @@ static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_mode
     return UZ_OK;
 }
 
-/* N as triplets, the areas of one contact's places, and one double per node: zero between contacts. */
+/* N, the areas of one contact's places, and one double per node: zero between contacts. */
 typedef struct {
-    int64_t count, *row, *col;
-    double *val, *area, *room;
+    uz_entries N;
+    double *area, *room;
 } row_work;
 
 /* `factor` times the normal on the free dofs of a node. */
-static void add_entries(row_work *work, const uz_body_model *model, int64_t row, int64_t node, const double normal[3],
+static void add_entries(uz_entries *N, const uz_body_model *model, int64_t row, int64_t node, const double normal[3],
                         double factor)
 {
     const int dim = model->mesh.dim;
@@ -122,24 +107,17 @@ static void add_entries(row_work *work, const uz_body_model *model, int64_t row,
     for (int64_t i = 0; i < carriers * dim; i++) {
         const int64_t dof = model->dof[from[i / dim] * dim + i % dim];
         const double part = dof < 0 ? 0 : carried_share(of, i / dim, (int)(i % dim), normal, dim);
-        if (fabs(part) <= 16 * DBL_EPSILON || factor == 0)
-            continue;
-        work->row[work->count] = row;
-        work->col[work->count] = dof;
-        work->val[work->count++] = factor * part;
+        if (fabs(part) > 16 * DBL_EPSILON && factor != 0)
+            uz_entries_add(N, row, dof, factor * part);
     }
     if (carriers > 0)
         return;
     for (int k = uz_mesh_hangs(&model->mesh, node) ? uz_mesh_amid(&from, &of, &model->mesh, node) : 0; k > 0; k--)
-        add_entries(work, model, row, from[k - 1], normal, factor * of[k - 1]);
+        add_entries(N, model, row, from[k - 1], normal, factor * of[k - 1]);
     uz_free_shares(share, model, node, normal);
-    for (int c = 0; c < dim; c++) {
-        if (share[c] == 0 || factor == 0)
-            continue;
-        work->row[work->count] = row;
-        work->col[work->count] = model->dof[node * dim + c];
-        work->val[work->count++] = factor * share[c];
-    }
+    for (int c = 0; c < dim; c++)
+        if (share[c] != 0 && factor != 0)
+            uz_entries_add(N, row, model->dof[node * dim + c], factor * share[c]);
 }
 
 static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_scene *scene, int64_t k,
@@ -167,9 +145,9 @@ static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row,
         info->contact_face[2 * *row + 1] = r.masters > 0 ? r.face.side : -1;
         memcpy(info->contact_normal + *row * dim, r.normal, (size_t)dim * sizeof *r.normal);
         for (int j = 0; j < r.slaves; j++)
-            add_entries(work, model, *row, r.slave[j], r.normal, -r.slave_share[j]);
+            add_entries(&work->N, model, *row, r.slave[j], r.normal, -r.slave_share[j]);
         for (int j = 0; j < r.masters; j++)
-            add_entries(work, model, *row, r.master[j], r.normal, r.master_share[j]);
+            add_entries(&work->N, model, *row, r.master[j], r.normal, r.master_share[j]);
         (*row)++;
     }
     return UZ_OK;
@@ -279,35 +257,28 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
 }
 
 /* Adds the shares of their ends to the rows of middles. Entries come row by row. */
-static bool blend_entries(row_work *work, const uz_body_model *model)
+static bool blend_entries(uz_entries *N, const uz_body_model *model)
 {
     const double scale = 1 / (1 - 2 * UZ_MIDDLE_SHARE);
-    int64_t *start = uz_alloc_zero(model->m + 1, sizeof *start), most = work->count;
+    int64_t *start = uz_alloc_zero(model->m + 1, sizeof *start);
     if (!start)
         return false;
-    for (int64_t q = 0; q < work->count; q++)
-        start[work->row[q] + 1] = q + 1;
+    for (int64_t q = 0; q < N->n; q++)
+        start[N->row[q] + 1] = q + 1;
     for (int64_t i = 0; i < model->m; i++) {
         start[i + 1] = start[i + 1] > start[i] ? start[i + 1] : start[i];
         for (int64_t q = start[i]; q < start[i + 1] && model->row_ends[2 * i] >= 0; q++)
-            work->val[q] *= scale;
+            N->val[q] *= scale;
     }
-    for (int64_t i = 0; i < 2 * model->m; i++)
-        if (model->row_ends[i] >= 0)
-            most += start[model->row_ends[i] + 1] - start[model->row_ends[i]];
-    const bool room = uz_triplets_grow(&work->row, &work->col, &work->val, most);
-    for (int64_t i = 0; i < model->m && room; i++)
+    for (int64_t i = 0; i < model->m; i++)
         for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++) {
             const int64_t end = model->row_ends[2 * i + k];
             const double plain = model->row_ends[2 * end] >= 0 ? 1 : scale; /* a middle's own entries are scaled */
-            for (int64_t q = start[end]; q < start[end + 1]; q++) {
-                work->row[work->count] = i;
-                work->col[work->count] = work->col[q];
-                work->val[work->count++] = -UZ_MIDDLE_SHARE * plain * work->val[q];
-            }
+            for (int64_t q = start[end]; q < start[end + 1]; q++)
+                uz_entries_add(N, i, N->col[q], -UZ_MIDDLE_SHARE * plain * N->val[q]);
         }
     free(start);
-    return room;
+    return true;
 }
 
 void uz_row_forces(double *f, const uz_body_model *model, const double *r)
@@ -354,11 +325,11 @@ void uz_blend_rows(double *gap, const uz_body_model *model)
 
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    row_work work = {.count = 0};
+    row_work work = {.area = NULL};
     uz_mesh_info *info = &model->info;
-    int64_t row = 0, entries, most_places;
+    int64_t row = 0, most_places;
     model->law = &uz_law_frictionless;
-    uz_status status = count_rows(&entries, &most_places, model, scene, err);
+    uz_status status = count_rows(&most_places, model, scene, err);
     if (status != UZ_OK)
         return status;
     info->contact_node = uz_alloc(model->m, sizeof *info->contact_node);
@@ -367,25 +338,20 @@ uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_
     info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
     info->contact_face = uz_alloc(2 * model->m, sizeof *info->contact_face);
     model->row_place = uz_alloc(model->m, sizeof *model->row_place);
-    work.row = uz_alloc(entries, sizeof *work.row);
-    work.col = uz_alloc(entries, sizeof *work.col);
-    work.val = uz_alloc(entries, sizeof *work.val);
     work.area = uz_alloc(most_places, sizeof *work.area);
     work.room = uz_alloc_zero(model->mesh.n_nodes, sizeof *work.room);
     if (!info->contact_node || !info->contact_area || !info->contact_normal || !info->contact_of ||
-        !info->contact_face || !model->row_place || !work.row || !work.col || !work.val || !work.area || !work.room)
+        !info->contact_face || !model->row_place || !work.area || !work.room)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
         status = add_contact(model, &work, &row, scene, k, err);
     if (status == UZ_OK)
         status = find_ends(model, scene, err);
-    if (status == UZ_OK && model->row_ends && !blend_entries(&work, model))
+    if (status == UZ_OK && model->row_ends && !blend_entries(&work.N, model))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
     if (status == UZ_OK)
-        status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
-    free(work.row);
-    free(work.col);
-    free(work.val);
+        status = uz_csc_from_entries(&model->N, model->m, model->d, &work.N, err);
+    uz_entries_clear(&work.N);
     free(work.area);
     free(work.room);
     return status;

@@ -314,15 +314,14 @@ static bool is_middle(const uz_contact_sites *sites, int64_t place)
 /* Fills the sites from the integrals: places without a row keep an infinite gap. contact_rows.c makes of the row of a
  * middle the transformed one, (row - s (first + second)) / (1 - 2 s), which moves the right slaves; the masters and the
  * gap, which are those of the transformed row already, are put in here so that they come out right. */
-static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const uz_mortar_surface *slave,
+static uz_status fill_sites(uz_contact_sites *sites, integrals *of, const uz_mortar_surface *slave,
                             const uz_body_model *model, uz_error *err)
 {
     const double s = UZ_MIDDLE_SHARE;
     const int dim = model->mesh.dim;
     uz_csc M = {0};
-    int64_t kept = 0, most = 0;
-    uz_status status = uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, of->masters.n, of->masters.row,
-                                            of->masters.col, of->masters.val, err);
+    uz_entries kept = {.n = 0};
+    uz_status status = uz_csc_from_entries(&M, model->mesh.n_nodes, sites->n, &of->masters, err);
     if (status != UZ_OK)
         return status;
     /* Where what covers a part of a side is far and steep, as the arm of a fold over its bend, the gap at the other end
@@ -336,49 +335,34 @@ static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const 
         sites->at[p] = slave->node[p];
         for (int c = 0; c < dim; c++)
             sites->normal[p * dim + c] = -slave->normal[p * dim + c];
-        most += M.ptr[p + 1] - M.ptr[p];
-        for (int k = 0; k < 2 && sites->ends[2 * p] >= 0; k++)
-            most += M.ptr[sites->ends[2 * p + k] + 1] - M.ptr[sites->ends[2 * p + k]];
     }
     /* A column of masters for each row; of a middle with those of its ends. */
-    int64_t *node = uz_alloc(most, sizeof *node), *place = uz_alloc(most, sizeof *place);
-    double *value = uz_alloc(most, sizeof *value);
-    bool room = node && place && value;
-    for (int64_t p = 0; p < sites->n && room; p++) {
+    for (int64_t p = 0; p < sites->n; p++) {
         const bool middle = isfinite(sites->gap[p]) && is_middle(sites, p);
         for (int k = 0; k < (middle ? 3 : 1) && isfinite(sites->gap[p]); k++) {
             const int64_t from = k == 0 ? p : sites->ends[2 * p + k - 1];
             const double share = (!middle ? 1 : k == 0 ? 1 - 2 * s : s) / of->D[from];
             for (int64_t q = M.ptr[from]; q < M.ptr[from + 1]; q++)
-                if (fabs(M.val[q]) > ROUNDING * of->D[from]) {
-                    node[kept] = M.idx[q];
-                    place[kept] = p;
-                    value[kept++] = share * M.val[q];
-                }
+                if (fabs(M.val[q]) > ROUNDING * of->D[from])
+                    uz_entries_add(&kept, M.idx[q], p, share * M.val[q]);
         }
     }
-    for (int64_t p = 0; p < sites->n && room; p++) /* ends are no middles: their gaps are their own yet */
+    for (int64_t p = 0; p < sites->n; p++) /* ends are no middles: their gaps are their own yet */
         if (is_middle(sites, p))
             sites->gap[p] =
                 (1 - 2 * s) * sites->gap[p] + s * (sites->gap[sites->ends[2 * p]] + sites->gap[sites->ends[2 * p + 1]]);
         else
             sites->ends[2 * p] = sites->ends[2 * p + 1] = -1;
     uz_csc_clear(&M);
-    status = room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err)
-                  : uz_no_memory(err, UZ_OF_SURFACES);
-    free(place);
-    free(value);
-    if (status != UZ_OK) {
-        free(node);
-        return status;
-    }
-    for (int64_t q = 0; q < M.ptr[M.cols]; q++)
-        node[q] = M.idx[q];
+    status = uz_csc_from_entries(&M, model->mesh.n_nodes, sites->n, &kept, err);
+    if (status == UZ_OK && !(sites->node = uz_alloc(M.ptr[M.cols], sizeof *sites->node)))
+        status = uz_no_memory(err, UZ_OF_SURFACES);
+    for (int64_t q = 0; status == UZ_OK && q < M.ptr[M.cols]; q++)
+        sites->node[q] = M.idx[q];
     free(M.idx);
     sites->first = M.ptr;
-    sites->node = node;
     sites->weight = M.val;
-    return UZ_OK;
+    return status;
 }
 
 static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_error *err)

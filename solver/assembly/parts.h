@@ -36,8 +36,8 @@ bool uz_have_carriers(const uz_body_model *model, const int64_t *node, int count
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count);
 /* The derivative B (dim x dim, by rows) of a force on node i by displacements of node j, as one by dofs of forces on
  * dofs; that of a number by displacements of node j, as one by dofs in a row. false: no memory. */
-bool uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9]);
-bool uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3]);
+void uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9]);
+void uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3]);
 /* u along the axes of a node that follows others, from the free dofs and the prescribed values (NULL: zero). */
 void uz_carried(double u[3], const uz_body_model *model, int64_t a, const double *free, const double *prescribed);
 /* The free dofs u (d) of a group get a motion: t at its point, w in radians. */

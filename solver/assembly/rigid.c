@@ -380,7 +380,7 @@ bool uz_is_unstrained(const uz_body_model *model, const int64_t *node, int count
     return unstrained;
 }
 
-bool uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9])
+void uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i, int64_t j, const double B[9])
 {
     const int dim = model->mesh.dim;
     const int64_t *p, *q;
@@ -388,35 +388,31 @@ bool uz_add_carried_block(uz_entries *to, const uz_body_model *model, int64_t i,
     double turned[2][9], block[9];
     const int64_t ps = carriers_or_self(&p, &P, turned[0], model, &i),
                   qs = carriers_or_self(&q, &Q, turned[1], model, &j);
-    bool room = true;
-    for (int64_t k = 0; k < ps * qs && room; k++) {
+    for (int64_t k = 0; k < ps * qs; k++) {
         carry_block(block, B, dim, P + k / qs * dim * dim, Q + k % qs * dim * dim, dim);
-        for (int c = 0; c < dim * dim && room; c++) {
+        for (int c = 0; c < dim * dim; c++) {
             const int64_t row = model->dof[p[k / qs] * dim + c / dim], column = model->dof[q[k % qs] * dim + c % dim];
             if (row >= 0 && column >= 0 && block[c] != 0)
-                room = uz_entries_add(to, row, column, block[c]);
+                uz_entries_add(to, row, column, block[c]);
         }
     }
-    return room;
 }
 
-bool uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3])
+void uz_add_carried_row(uz_entries *to, int64_t row, const uz_body_model *model, int64_t j, const double slope[3])
 {
     const int dim = model->mesh.dim;
     const int64_t *node;
     const double *share;
     double turned[9];
     const int64_t count = carriers_or_self(&node, &share, turned, model, &j);
-    bool room = true;
-    for (int64_t i = 0; i < count * dim && room; i++) {
+    for (int64_t i = 0; i < count * dim; i++) {
         const int64_t dof = model->dof[node[i / dim] * dim + i % dim];
         double along = 0;
         for (int c = 0; c < dim; c++)
             along += share[(i / dim * dim + c) * dim + i % dim] * slope[c];
         if (dof >= 0 && along != 0)
-            room = uz_entries_add(to, row, dof, along);
+            uz_entries_add(to, row, dof, along);
     }
-    return room;
 }
 
 void uz_add_carried(uz_body_model *model, const double *ke, const int64_t *node, int count)

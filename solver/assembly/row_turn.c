@@ -209,16 +209,18 @@ static bool is_moved(const uz_body_model *model, int64_t node, int c)
                                              : model->dof[model->mesh.dim * node + c] >= 0;
 }
 
-static bool add_slope(uz_entries *to, int64_t row, const uz_body_model *model, int64_t node, int c, double value)
+static void add_slope(uz_entries *to, int64_t row, const uz_body_model *model, int64_t node, int c, double value)
 {
     const double slope[3] = {c == 0 ? value : 0, c == 1 ? value : 0, c == 2 ? value : 0};
-    return uz_have_carriers(model, &node, 1) ? uz_add_carried_row(to, row, model, node, slope)
-                                             : uz_entries_add(to, row, model->dof[model->mesh.dim * node + c], value);
+    if (uz_have_carriers(model, &node, 1))
+        uz_add_carried_row(to, row, model, node, slope);
+    else
+        uz_entries_add(to, row, model->dof[model->mesh.dim * node + c], value);
 }
 
 /* What two places on either side say of the pressed rows: each depends on one of the moved nodes at most. Where nodes
  * have common dofs the part of N is added once for all of them, by add_pressed_rows. */
-static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2], int64_t color, int c)
+static void add_differences(uz_row_turn *out, work *w, const moved_rows side[2], int64_t color, int c)
 {
     const uz_body_model *base = w->base;
     for (int64_t j = 0; j < w->n_pressed; j++) {
@@ -229,15 +231,15 @@ static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
             continue;
         if (side[0].at[j] < 0 || side[1].at[j] < 0) {
             out->known = false;
-            return true;
+            return;
         }
         const int64_t row = w->pressed[j],
                       own =
                           base->follow.first ? -1 : uz_csc_find(&w->rows->N, row, base->dof[base->mesh.dim * node + c]);
         const double change = (side[1].gap[j] - side[0].gap[j]) / (2 * w->by),
                      along = own < 0 ? 0 : w->rows->N.val[own];
-        if (fabs(change + along) > ROUNDING && !add_slope(&out->gap, row, base, node, c, change + along))
-            return false;
+        if (fabs(change + along) > ROUNDING)
+            add_slope(&out->gap, row, base, node, c, change + along);
         for (int s = 0; s < 2; s++)
             for (int64_t q = side[s].rows.ptr[side[s].at[j]]; q < side[s].rows.ptr[side[s].at[j] + 1]; q++)
                 w->sum[side[s].rows.idx[q]] += (s ? 1 : -1) * side[s].rows.val[q];
@@ -246,12 +248,10 @@ static bool add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
                 const int64_t i = side[s].rows.idx[q];
                 const double slope = w->sum[i] / (2 * w->by);
                 w->sum[i] = 0;
-                if (fabs(slope) * w->by > ROUNDING * MOVED_BY &&
-                    !add_slope(&out->force, i, base, node, c, w->r[row] * slope))
-                    return false;
+                if (fabs(slope) * w->by > ROUNDING * MOVED_BY)
+                    add_slope(&out->force, i, base, node, c, w->r[row] * slope);
             }
     }
-    return true;
 }
 
 /* u: `by` along c at the nodes of a color that others carry, whose way tells nothing of them. */
@@ -301,25 +301,25 @@ static uz_status move_color(uz_row_turn *out, work *w, moved_rows side[2], int64
             *err = own;
         }
     }
-    if (status == UZ_OK && any && out->known && !add_differences(out, w, side, color, c))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
+    if (status == UZ_OK && any && out->known)
+        add_differences(out, w, side, color, c);
     uz_csc_clear(&side[0].rows);
     uz_csc_clear(&side[1].rows);
     return status;
 }
 
-static bool add_pressed_rows(uz_entries *to, const work *w)
+static bool is_pressed(const work *w, int64_t i)
+{
+    return w->r[i] < -w->least && w->scene->contacts[w->rows->info.contact_of[i]].kind == UZ_OBSTACLE_BODY;
+}
+
+static void add_pressed_rows(uz_entries *to, const work *w)
 {
     const uz_csc *N = &w->rows->N;
-    bool room = true;
     for (int64_t j = 0; j < N->cols; j++)
-        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1] && room; q++) {
-            const int64_t i = N->idx[q];
-            const bool pressed =
-                w->r[i] < -w->least && w->scene->contacts[w->rows->info.contact_of[i]].kind == UZ_OBSTACLE_BODY;
-            room = !pressed || uz_entries_add(to, i, j, N->val[q]);
-        }
-    return room;
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+            if (is_pressed(w, N->idx[q]))
+                uz_entries_add(to, N->idx[q], j, N->val[q]);
 }
 
 /* The body at rest, whose nodes follow others as they do in `rows`. */
@@ -336,7 +336,7 @@ static bool list_pressed(work *w)
     const uz_body_model *rows = w->rows;
     w->pressed = uz_alloc(rows->m, sizeof *w->pressed);
     for (int64_t i = 0; i < rows->m && w->pressed; i++)
-        if (w->r[i] < -w->least && w->scene->contacts[rows->info.contact_of[i]].kind == UZ_OBSTACLE_BODY)
+        if (is_pressed(w, i))
             w->pressed[w->n_pressed++] = i;
     return w->pressed != NULL;
 }
@@ -373,7 +373,9 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
             if (out->known)
                 status = move_color(out, &w, side, color, c, err);
         }
-    if (status == UZ_OK && base->follow.first && !add_pressed_rows(&out->gap, &w))
+    if (status == UZ_OK && base->follow.first)
+        add_pressed_rows(&out->gap, &w);
+    if (status == UZ_OK && (out->force.failed || out->gap.failed))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
     if (!out->known)
         out->force.n = out->gap.n = 0;
@@ -509,25 +511,21 @@ uz_status uz_widen_by_rows(uz_csc *out, const uz_csc *K, const uz_csc *N, const 
 {
     uz_entries all = {.n = 0};
     uz_csc rows = {0};
-    uz_status status = uz_csc_transpose(&rows, N, err);
-    bool room = true;
-    for (int64_t j = 0; j < K->cols && status == UZ_OK && room; j++)
-        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1] && room; q++)
-            room = uz_entries_add(&all, K->idx[q], j, K->val[q]);
-    for (int64_t i = 0; i < N->rows && status == UZ_OK && room && r; i++)
+    const uz_status status = uz_csc_transpose(&rows, N, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            uz_entries_add(&all, K->idx[q], j, K->val[q]);
+    for (int64_t i = 0; i < N->rows && r; i++)
         for (int64_t p = rows.ptr[i]; p < rows.ptr[i + 1] && r[i] < -least; p++)
-            for (int64_t q = rows.ptr[i]; q <= p && room; q++)
-                room = uz_entries_add(&all, rows.idx[p], rows.idx[q], 0);
-    for (int64_t k = 0; turn && k < turn->force.n && status == UZ_OK && room; k++) {
+            for (int64_t q = rows.ptr[i]; q <= p; q++)
+                uz_entries_add(&all, rows.idx[p], rows.idx[q], 0);
+    for (int64_t k = 0; turn && k < turn->force.n; k++) {
         const int64_t i = turn->force.row[k], j = turn->force.col[k];
         const double value = turn->force.val[k];
-        room = uz_entries_add(&all, i > j ? i : j, i > j ? j : i, i == j ? -value : -0.5 * value);
+        uz_entries_add(&all, i > j ? i : j, i > j ? j : i, i == j ? -value : -0.5 * value);
     }
-    if (status == UZ_OK && !room)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stiffness of %lld dofs", (long long)K->cols);
-    if (status == UZ_OK)
-        status = uz_csc_from_triplets(out, K->rows, K->cols, all.n, all.row, all.col, all.val, err);
-    uz_entries_clear(&all);
     uz_csc_clear(&rows);
-    return status;
+    return uz_csc_from_entries(out, K->rows, K->cols, &all, err);
 }

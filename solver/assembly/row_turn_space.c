@@ -91,18 +91,17 @@ static void of_unit(double B[3][3], const double n[3], double length)
 }
 
 /* Of the normal at a face's node a, a part of that of its place, by displacements of the face's nodes. */
-static bool turn_normal(work *w, const uz_mortar_side *side, int a)
+static void turn_normal(work *w, const uz_mortar_side *side, int a)
 {
     const int64_t p = side->place[a];
     const uz_contact_sites *sites = w->sites;
     const uz_side shape = {.dim = 3, .nodes = side->nodes, .xyz = side->xyz};
     double T[2][3], slope[NODES][3], own[3], whole[3];
-    bool room = true;
     tangents(T, slope, side, uz_side_local_nodes(&shape)[a]);
     uz_cross3(own, T[0], T[1]);
     memcpy(whole, w->sum + 3 * p, sizeof whole);
     const double area = uz_unit3(own), length = uz_unit3(whole);
-    for (int b = 0; b < side->nodes && room; b++) {
+    for (int b = 0; b < side->nodes; b++) {
         double B[3][3];
         for (int k = 0; k < 3; k++) {
             const double way[3] = {k == 0, k == 1, k == 2};
@@ -114,33 +113,30 @@ static bool turn_normal(work *w, const uz_mortar_side *side, int a)
         }
         of_unit(B, own, area);
         of_unit(B, whole, length);
-        for (int64_t q = sites->first[p] - 1; q < sites->first[p + 1] && room; q++) { /* the slave, then masters */
+        for (int64_t q = sites->first[p] - 1; q < sites->first[p + 1]; q++) { /* the slave, then masters */
             const bool slave = q < sites->first[p];
             const double factor = w->along[p] * (slave ? 1 : -sites->weight[q]);
             double part[9];
             for (int k = 0; k < 9; k++)
                 part[k] = factor * B[k / 3][k % 3];
-            room = uz_add_carried_block(&w->out->force, w->rows, slave ? sites->at[p] : sites->node[q], side->node[b],
-                                        part);
+            uz_add_carried_block(&w->out->force, w->rows, slave ? sites->at[p] : sites->node[q], side->node[b], part);
         }
     }
-    return room;
 }
 
-static bool turn_normals(work *w)
+static void turn_normals(work *w)
 {
     const uz_mortar_surface *surface = &w->pair->surface;
-    bool room = true;
     for (int pass = 0; pass < 2; pass++)
-        for (int64_t i = 0; i < surface->n && room; i++)
-            for (int a = 0; a < surface->side[i].nodes && room; a++) {
+        for (int64_t i = 0; i < surface->n; i++)
+            for (int a = 0; a < surface->side[i].nodes; a++) {
                 const uz_mortar_side *side = &surface->side[i];
                 const uz_side shape = {.dim = 3, .nodes = side->nodes, .xyz = side->xyz};
                 double normal[3];
                 if (w->along[side->place[a]] == 0)
                     continue;
                 if (pass == 1) {
-                    room = turn_normal(w, side, a);
+                    turn_normal(w, side, a);
                     continue;
                 }
                 uz_side_area_vector(normal, &shape, uz_side_local_nodes(&shape)[a]);
@@ -148,7 +144,6 @@ static bool turn_normals(work *w)
                 for (int c = 0; c < 3; c++)
                     w->sum[3 * side->place[a] + c] += normal[c];
             }
-    return room;
 }
 
 /* ---- points that slide */
@@ -210,23 +205,21 @@ static void add_point(slopes *to, const work *w, const uz_mortar_side *side, con
     }
 }
 
-static bool take_slopes(work *w, const slopes *of, const uz_mortar_side *side, const uz_mortar_side *other)
+static void take_slopes(work *w, const slopes *of, const uz_mortar_side *side, const uz_mortar_side *other)
 {
     const int count = side->nodes + other->nodes;
-    bool room = true;
-    for (int b = 0; b < count && room; b++) {
+    for (int b = 0; b < count; b++) {
         const int64_t j = b < side->nodes ? side->node[b] : other->node[b - side->nodes];
-        for (int l = 0; l < other->nodes && room; l++) {
+        for (int l = 0; l < other->nodes; l++) {
             double B[9];
             for (int c = 0; c < 3; c++)
                 memcpy(B + 3 * c, of->force[l][c][b], 3 * sizeof *B);
-            room = uz_add_carried_block(&w->out->force, w->rows, other->node[l], j, B);
+            uz_add_carried_block(&w->out->force, w->rows, other->node[l], j, B);
         }
-        for (int a = 0; a < side->nodes && room; a++)
+        for (int a = 0; a < side->nodes; a++)
             if (w->row[side->place[a]] >= 0)
-                room = uz_add_carried_row(&w->out->gap, w->row[side->place[a]], w->rows, j, of->gap[a][b]);
+                uz_add_carried_row(&w->out->gap, w->row[side->place[a]], w->rows, j, of->gap[a][b]);
     }
-    return room;
 }
 
 static bool slide_side(work *w, int64_t i, double **share, int64_t *most, slopes *room)
@@ -236,7 +229,7 @@ static bool slide_side(work *w, int64_t i, double **share, int64_t *most, slopes
     const uz_side shape = {.dim = 3, .nodes = side->nodes, .xyz = side->xyz};
     const double centre[2] = {side->nodes % 3 == 0 ? 1.0 / 3 : 0, side->nodes % 3 == 0 ? 1.0 / 3 : 0};
     double across[3], D[NODES];
-    bool any = false, good = true;
+    bool any = false;
     for (int a = 0; a < side->nodes; a++)
         any = any || uz_dot3(w->shares + 3 * side->place[a], w->shares + 3 * side->place[a]) > 0;
     if (!any)
@@ -250,15 +243,15 @@ static bool slide_side(work *w, int64_t i, double **share, int64_t *most, slopes
         return true;
     uz_side_area_vector(across, &shape, centre);
     uz_unit3(across);
-    for (int64_t g = 0; g < points->n && good; g++) {
+    for (int64_t g = 0; g < points->n; g++) {
         const uz_mortar_point *p = &points->point[g];
         if (g == 0 || p[-1].master != p->master)
             memset(room, 0, sizeof *room);
         add_point(room, w, side, p, *share + g, points->n, across);
         if (g + 1 == points->n || p[1].master != p->master)
-            good = take_slopes(w, room, side, &pair->surface.side[p->master]);
+            take_slopes(w, room, side, &pair->surface.side[p->master]);
     }
-    return good;
+    return true;
 }
 
 static bool slide_all(work *w)
@@ -275,17 +268,15 @@ static bool slide_all(work *w)
 }
 
 /* What the gaps' slopes are off -N. */
-static bool add_rows(work *w)
+static void add_rows(work *w)
 {
     const uz_csc *N = &w->rows->N;
-    bool room = true;
     for (int64_t j = 0; j < N->cols; j++)
-        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1] && room; q++) {
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
             const int64_t i = N->idx[q];
             if (w->rows->info.contact_of[i] == w->contact && w->r[i] < -w->least)
-                room = uz_entries_add(&w->out->gap, i, j, N->val[q]);
+                uz_entries_add(&w->out->gap, i, j, N->val[q]);
         }
-    return room;
 }
 
 static uz_status turn_contact(uz_row_turn *out, const uz_contact_input *in, const uz_body_model *rows, const double *r,
@@ -300,9 +291,14 @@ static uz_status turn_contact(uz_row_turn *out, const uz_contact_input *in, cons
     w.shares = w.along ? w.along + n : NULL;
     w.sum = w.along ? w.along + 4 * n : NULL;
     uz_status status = uz_mortar_pair_make(&pair, in, err);
-    if (status == UZ_OK && w.row && w.along)
+    bool room = w.row && w.along;
+    if (status == UZ_OK && room) {
         weigh_places(&w);
-    if (status == UZ_OK && !(w.row && w.along && turn_normals(&w) && slide_all(&w) && add_rows(&w)))
+        turn_normals(&w);
+        room = slide_all(&w);
+        add_rows(&w);
+    }
+    if (status == UZ_OK && (!room || out->force.failed || out->gap.failed))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
     uz_mortar_pair_clear(&pair);
     free(w.row);

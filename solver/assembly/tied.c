@@ -76,11 +76,10 @@ static uz_status add_tie(uz_entries *to, const uz_body_model *model, const uz_ti
         const double near = tie->tolerance > 0 ? tie->tolerance : NEAR * longest_edge(model, sites.face[p]);
         nearest = fmin(nearest, fabs(sites.gap[p]));
         for (int64_t q = sites.first[p]; q < sites.first[p + 1] && fabs(sites.gap[p]) <= near; q++)
-            if (!uz_entries_add(to, sites.node[q], sites.at[p], sites.area[p] * sites.weight[q]))
-                status = uz_no_memory(err, "ties");
+            uz_entries_add(to, sites.node[q], sites.at[p], sites.area[p] * sites.weight[q]);
     }
     snprintf(where, sizeof where, "/ties/%lld", (long long)k);
-    if (status == UZ_OK && to->n == before)
+    if (status == UZ_OK && to->n == before && !to->failed)
         status =
             uz_fail(err, UZ_ERR_SCENE, where,
                     "\"%.63s\" is not near enough to \"%.63s\" to be tied: %g apart; give a tolerance, or move the "
@@ -121,7 +120,7 @@ uz_status uz_find_tied(uz_body_model *model, const uz_scene *scene, uz_error *er
     for (int64_t k = 0; k < scene->n_ties && status == UZ_OK; k++)
         status = add_tie(&all, model, &scene->ties[k], k, err);
     if (status == UZ_OK)
-        status = uz_csc_from_triplets(&tied->share, n, n, all.n, all.row, all.col, all.val, err);
+        status = uz_csc_from_entries(&tied->share, n, n, &all, err);
     uz_entries_clear(&all);
     for (int64_t a = 0; a < n && status == UZ_OK; a++) { /* by area, where several places or ties have the node */
         double sum = 0, *value = tied->share.val;

@@ -26,29 +26,22 @@ static bool place_rows(uz_springs *a, const uz_csc *S)
 }
 
 /* S with the entries of K and of the pairs of dofs that are in a row together, and their places. */
-static uz_status unite_patterns(uz_springs *a, int64_t pairs, uz_error *err)
+static uz_status unite_patterns(uz_springs *a, uz_error *err)
 {
     const uz_csc *Nt = &a->dual->Nt, *K = a->K;
-    const int64_t d = a->dual->d, count = K->ptr[d] + pairs;
-    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column), at = 0;
-    double *value = uz_alloc_zero(count, sizeof *value);
+    const int64_t d = a->dual->d;
+    uz_entries all = {.n = 0};
     a->of_K = uz_alloc(K->ptr[d], sizeof *a->of_K);
-    uz_status status = UZ_OK;
-    if (!row || !column || !value || !a->of_K)
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)a->dual->m);
-    for (int64_t j = 0; status == UZ_OK && j < d; j++)
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++, at++) {
-            row[at] = K->idx[k];
-            column[at] = j;
-        }
-    for (int64_t i = 0; status == UZ_OK && i < a->dual->m; i++)
+    if (!a->of_K)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)a->dual->m);
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            uz_entries_add(&all, K->idx[k], j, 0);
+    for (int64_t i = 0; i < a->dual->m; i++)
         for (int64_t k = Nt->ptr[i]; (!a->rows || a->rows[i]) && k < Nt->ptr[i + 1]; k++)
-            for (int64_t l = Nt->ptr[i]; l <= k; l++, at++) {
-                row[at] = Nt->idx[k];
-                column[at] = Nt->idx[l];
-            }
-    if (status == UZ_OK)
-        status = uz_csc_from_triplets(&a->S, d, d, at, row, column, value, err);
+            for (int64_t l = Nt->ptr[i]; l <= k; l++)
+                uz_entries_add(&all, Nt->idx[k], Nt->idx[l], 0);
+    const uz_status status = uz_csc_from_entries(&a->S, d, d, &all, err);
     for (int64_t j = 0; status == UZ_OK && j < d; j++) /* both are sorted */
         for (int64_t k = K->ptr[j], s = a->S.ptr[j]; k < K->ptr[j + 1]; k++) {
             while (a->S.idx[s] < K->idx[k])
@@ -57,9 +50,6 @@ static uz_status unite_patterns(uz_springs *a, int64_t pairs, uz_error *err)
         }
     if (status == UZ_OK)
         (void)place_rows(a, &a->S);
-    free(row);
-    free(column);
-    free(value);
     return status;
 }
 
@@ -77,7 +67,7 @@ uz_status uz_springs_create(uz_springs *a, const uz_csc *K, const uz_dual *dual,
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)dual->m);
     const uz_factor_info info = uz_factor_describe(dual->factor);
     const bool within = place_rows(a, K);
-    uz_status status = within ? uz_csc_copy(&a->S, K, err) : unite_patterns(a, pairs, err);
+    uz_status status = within ? uz_csc_copy(&a->S, K, err) : unite_patterns(a, err);
     if (status == UZ_OK && within && !info.contact_last)
         a->analysis = uz_factor_analysis(dual->factor);
     else if (status == UZ_OK)

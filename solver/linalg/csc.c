@@ -215,29 +215,30 @@ int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
     return k < A->ptr[column + 1] && A->idx[k] == row ? k : -1;
 }
 
-bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room)
-{
-    int64_t *rows = uz_realloc(*row, room, sizeof *rows);
-    *row = rows ? rows : *row;
-    int64_t *cols = uz_realloc(*col, room, sizeof *cols);
-    *col = cols ? cols : *col;
-    double *vals = uz_realloc(*val, room, sizeof *vals);
-    *val = vals ? vals : *val;
-    return rows && cols && vals;
-}
-
 bool uz_entries_add(uz_entries *to, int64_t row, int64_t col, double value)
 {
-    if (to->n == to->room) {
-        const int64_t room = 2 * to->room + 1024;
-        if (!uz_triplets_grow(&to->row, &to->col, &to->val, room))
-            return false;
-        to->room = room;
+    if (to->n == to->room && !to->failed) {
+        int64_t room[3] = {to->room, to->room, to->room};
+        to->failed = !uz_grow(&to->row, to->n, 1, &room[0], sizeof *to->row) ||
+                     !uz_grow(&to->col, to->n, 1, &room[1], sizeof *to->col) ||
+                     !uz_grow(&to->val, to->n, 1, &room[2], sizeof *to->val);
+        to->room = to->failed ? to->room : room[0];
     }
+    if (to->failed)
+        return false;
     to->row[to->n] = row;
     to->col[to->n] = col;
     to->val[to->n++] = value;
     return true;
+}
+
+uz_status uz_csc_from_entries(uz_csc *out, int64_t rows, int64_t cols, uz_entries *from, uz_error *err)
+{
+    const uz_status status =
+        from->failed ? uz_fail(err, UZ_ERR_MEMORY, "", "no memory for more than %lld entries", (long long)from->n)
+                     : uz_csc_from_triplets(out, rows, cols, from->n, from->row, from->col, from->val, err);
+    uz_entries_clear(from);
+    return status;
 }
 
 void uz_entries_clear(uz_entries *entries)

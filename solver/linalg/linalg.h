@@ -19,16 +19,16 @@ int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column);
 /* What columns begin to end - 1 of uz_csc_symv's A add to y: nothing above row `begin`. */
 void uz_csc_symv_columns(double *y, const uz_csc *A, double alpha, const double *x, int64_t begin, int64_t end);
 
-/* Room for so many triplets in each of three arrays. False: no memory, and all that is there stays. */
-bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room);
-
-/* Triplets that come one by one, for uz_csc_from_triplets; zeroed at first. */
+/* Triplets that come one by one; zeroed at first. */
 typedef struct {
     int64_t n, room, *row, *col;
     double *val;
+    bool failed; /* there was no memory for one: no further one is added */
 } uz_entries;
-/* False: no memory, and all that is there stays. */
+/* False: they have failed, and all that is there stays. */
 bool uz_entries_add(uz_entries *to, int64_t row, int64_t col, double value);
+/* uz_csc_from_triplets of them, after which they are clear. UZ_ERR_MEMORY, also where they have failed. */
+uz_status uz_csc_from_entries(uz_csc *out, int64_t rows, int64_t cols, uz_entries *from, uz_error *err);
 /* Frees what they have, and makes them zero. */
 void uz_entries_clear(uz_entries *entries);
 

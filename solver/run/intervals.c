@@ -11,6 +11,7 @@
 #include "bound/interval.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 #include "post/functional.h"
 #include "run/interval_share.h"
 #include "run/setup_cache.h"
@@ -128,38 +129,27 @@ static uz_status find_coefficients(contact_rows *x, const uz_bound_body *body, u
 /* N of these rows. */
 static uz_status make_coefficients(contact_rows *x, const uz_csc *N, uz_error *err)
 {
-    const int64_t most = 3 * N->ptr[N->cols];
-    int64_t *followers = uz_alloc(2 * x->m, sizeof *followers), *row = uz_alloc(most, sizeof *row),
-            *column = uz_alloc(most, sizeof *column), count = 0;
-    double *value = uz_alloc(most, sizeof *value);
-    uz_status status = followers && row && column && value
-                           ? UZ_OK
-                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
-    for (int64_t k = 0; k < 2 * x->m && status == UZ_OK; k++)
+    int64_t *followers = uz_alloc(2 * x->m, sizeof *followers);
+    uz_entries all = {.n = 0};
+    if (!followers)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)x->m);
+    for (int64_t k = 0; k < 2 * x->m; k++)
         followers[k] = -1;
-    for (int64_t k = 0; k < x->m && status == UZ_OK; k++)
+    for (int64_t k = 0; k < x->m; k++)
         for (int a = 0; a < 2 && x->ends[2 * k] >= 0; a++) {
             int64_t *at = followers + 2 * x->ends[2 * k + a];
             at[at[0] >= 0] = k; /* an end has two edges at most */
         }
-    for (int64_t j = 0; j < N->cols && status == UZ_OK; j++)
+    for (int64_t j = 0; j < N->cols; j++)
         for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
             const int64_t k = N->idx[q], *more = followers + 2 * k;
-            for (int a = -1; a < 2; a++) {
-                if (a >= 0 && more[a] < 0)
-                    continue;
-                row[count] = a < 0 ? k : more[a];
-                column[count] = j;
-                value[count++] = N->val[q] * (a >= 0 ? -0.5 : x->ends[2 * k] >= 0 ? 2 : 1);
-            }
+            uz_entries_add(&all, k, j, N->val[q] * (x->ends[2 * k] >= 0 ? 2 : 1));
+            for (int a = 0; a < 2; a++)
+                if (more[a] >= 0)
+                    uz_entries_add(&all, more[a], j, -0.5 * N->val[q]);
         }
-    if (status == UZ_OK)
-        status = uz_csc_from_triplets(&x->N, x->m, N->cols, count, row, column, value, err);
     free(followers);
-    free(row);
-    free(column);
-    free(value);
-    return status;
+    return uz_csc_from_entries(&x->N, x->m, N->cols, &all, err);
 }
 
 static void end_contact_rows(contact_rows *x, uz_cache *cache)

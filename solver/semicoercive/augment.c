@@ -33,19 +33,6 @@ void uz_row_stiffness(double *stiffness, double *inverse, const uz_csc *K, const
     }
 }
 
-/* K's entries, and those of the lower triangle of N'R N. */
-typedef struct {
-    int64_t count, *row, *col;
-    double *val;
-} triplets;
-
-static void add(triplets *t, int64_t a, int64_t b, double value)
-{
-    t->row[t->count] = a > b ? a : b;
-    t->col[t->count] = a > b ? b : a;
-    t->val[t->count++] = value;
-}
-
 uz_status uz_augment(uz_problem *out, const uz_singular *of, const uz_csc *Nt, const double *weight,
                      const double *target, uz_error *err)
 {
@@ -56,28 +43,15 @@ uz_status uz_augment(uz_problem *out, const uz_singular *of, const uz_csc *Nt, c
     if (!p)
         return uz_fail(err, UZ_ERR_MEMORY, "p", "no memory for a load on %lld dofs", (long long)d);
     const uz_csc *K = of->K;
-    int64_t most = K->ptr[d];
-    for (int64_t i = 0; i < Nt->cols; i++) {
-        int64_t length = Nt->ptr[i + 1] - Nt->ptr[i];
-        most += weight[i] > 0.0 ? length * (length + 1) / 2 : 0;
-    }
-    triplets t = {0, uz_alloc(most, sizeof *t.row), uz_alloc(most, sizeof *t.col), uz_alloc(most, sizeof *t.val)};
-    uz_status status = UZ_OK;
-    if (!t.row || !t.col || !t.val) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld entries", (long long)most);
-    } else {
-        for (int64_t j = 0; j < d; j++)
-            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-                add(&t, K->idx[q], j, K->val[q]);
-        for (int64_t i = 0; i < Nt->cols; i++)
-            for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
-                for (int64_t b = Nt->ptr[i]; b <= a; b++)
-                    add(&t, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
-        status = uz_csc_from_triplets(&out->qp.K, d, d, t.count, t.row, t.col, t.val, err);
-    }
-    free(t.row);
-    free(t.col);
-    free(t.val);
+    uz_entries all = {.n = 0}; /* of the lower triangle of K + N'R N */
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            uz_entries_add(&all, K->idx[q], j, K->val[q]);
+    for (int64_t i = 0; i < Nt->cols; i++)
+        for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
+            for (int64_t b = Nt->ptr[i]; b <= a; b++) /* rows ascend */
+                uz_entries_add(&all, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
+    const uz_status status = uz_csc_from_entries(&out->qp.K, d, d, &all, err);
     memcpy(p, of->p, (size_t)d * sizeof *p);
     for (int64_t i = 0; i < Nt->cols; i++)
         for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
