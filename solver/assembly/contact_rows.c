@@ -13,6 +13,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/linalg.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <float.h>
@@ -424,16 +425,15 @@ static double gap_at(double *scale, const uz_body_model *model, const uz_contact
 static uz_status check_held(const uz_body_model *model, const uz_contact_row *row, int64_t contact, double gap,
                             double scale, uz_error *err)
 {
-    char where[96], at[96];
+    char at[96];
     const double *x = model->mesh.xyz + row->node * model->mesh.dim;
     if (gap >= -1e-9 * model->mesh.extent - 1e-13 * scale)
         return UZ_OK;
-    snprintf(where, sizeof where, "/contacts/%lld", (long long)contact);
     if (model->mesh.dim == 2)
         snprintf(at, sizeof at, "(%g, %g)", x[0], x[1]);
     else
         snprintf(at, sizeof at, "(%g, %g, %g)", x[0], x[1], x[2]);
-    return uz_fail(err, UZ_ERR_SCENE, where,
+    return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", contact, NULL),
                    "node %lld at %s is held by a support %g inside the obstacle and cannot give way; "
                    "move the obstacle, or let the node move along its normal",
                    (long long)row->node, at, -gap);

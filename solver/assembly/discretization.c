@@ -4,10 +4,10 @@
 #include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,15 +22,13 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
                               uz_error *err)
 {
     const uz_contact *contact = &scene->contacts[index];
-    char where[96];
     *in = (uz_contact_input){.model = model, .contact = contact, .index = index};
     in->on = uz_mesh_group(&model->mesh, contact->on, "/contacts", err);
     if (!in->on)
         return UZ_ERR_SCENE;
     if (contact->kind != UZ_OBSTACLE_BODY)
         return UZ_OK;
-    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
-    in->with = uz_mesh_group(&model->mesh, contact->with, where, err);
+    in->with = uz_mesh_group(&model->mesh, contact->with, UZ_PLACE("contacts", index, "with"), err);
     return in->with ? UZ_OK : UZ_ERR_SCENE;
 }
 

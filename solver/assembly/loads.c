@@ -4,10 +4,10 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -153,10 +153,7 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
     memset(f, 0, (size_t)(model->mesh.n_nodes * model->mesh.dim) * sizeof *f);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
         const loading x = {model, &scene->loads[i], f, uz_is_finite_answer(scene)};
-        char where[96];
-        snprintf(where, sizeof where, "/loads/%lld/%s", (long long)i,
-                 scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on");
-        status = add_load(&x, where, err);
+        status = add_load(&x, UZ_PLACE("loads", i, scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on"), err);
     }
     return status;
 }

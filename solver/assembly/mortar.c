@@ -23,9 +23,9 @@
 #include "core/vector3.h"
 #include "linalg/linalg.h"
 #include "obstacle/projection.h"
+#include "scene/check.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -89,7 +89,6 @@ void uz_mortar_surface_clear(uz_mortar_surface *surface)
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
                                  uz_error *err)
 {
-    char where[96];
     *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
     uz_status status = out->side ? UZ_OK : uz_no_memory(err, UZ_OF_SURFACES);
     for (int64_t i = 0; i < out->n && status == UZ_OK; i++) {
@@ -101,9 +100,9 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
         side->area = uz_side_area(&shape);
         if (side->area > 0)
             continue;
-        snprintf(where, sizeof where, "/contacts/%lld", (long long)in->index);
-        status = uz_fail(err, UZ_ERR_SCENE, where, "the side at node %lld of \"%.63s\" has no area, and so no normal",
-                         (long long)side->node[0], group->name);
+        status = uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", in->index, NULL),
+                         "the side at node %lld of \"%.63s\" has no area, and so no normal", (long long)side->node[0],
+                         group->name);
     }
     if (status == UZ_OK && !uz_mortar_geometry_of(in->model->mesh.dim)->places(out, in))
         status = uz_no_memory(err, UZ_OF_SURFACES);
@@ -401,7 +400,6 @@ static uz_status make_rows(uz_contact_sites *sites, uz_mortar_pair *pair, uz_err
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
     uz_mortar_pair pair = {.in = in};
-    char where[96];
     uz_status status = uz_contact_pair_check(&in->model->mesh, in->on, in->with, in->index, err);
     if (status == UZ_OK)
         status = uz_mortar_pair_make(&pair, in, err);
@@ -428,9 +426,8 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     }
     free(some.side);
     if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
-        snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
-        status =
-            uz_fail(err, UZ_ERR_SCENE, where, "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
+        status = uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", in->index, "on"),
+                         "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }
     uz_mortar_pair_clear(&pair);
     return status;

@@ -7,6 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -77,7 +78,6 @@ static uz_status agree_with_group(const prescription *p, int64_t support, int64_
     const double *share;
     const int64_t count = uz_carriers(&from, &share, model, node);
     double u[3], along = 0, size = fabs(value);
-    char where[96];
     const bool turns = uz_is_finite_answer(p->scene) && is_turned(p, group, node, n);
     bool moves = false;
     for (int64_t k = 0; k < count; k++)
@@ -94,8 +94,7 @@ static uz_status agree_with_group(const prescription *p, int64_t support, int64_
     }
     if (!moves && !turns && fabs(along - value) <= AGREE * size)
         return UZ_OK;
-    snprintf(where, sizeof where, "/supports/%lld/on", (long long)support);
-    return uz_fail(err, UZ_ERR_SCENE, where,
+    return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", support, "on"),
                    "node %lld of \"%.63s\" is of the rigid group \"%.63s\", which %s: prescribe that motion of the "
                    "group, or leave the node out of one of them",
                    (long long)node, p->scene->supports[support].on, p->scene->supports[group->support].on,
@@ -145,7 +144,6 @@ static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c
 
 static uz_status prescribe_along(prescription *p, int64_t support, int64_t node, const double n[3], uz_error *err)
 {
-    char where[96];
     const double value = p->scene->supports[support].value;
     const int64_t *dof = p->model->dof + node * p->model->mesh.dim;
     double known = 0, size = 0, share[3]; /* what the dofs given so far make of n . u */
@@ -174,8 +172,7 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
     }
     if (fabs(value - known) <= AGREE * (fabs(value) + size))
         return UZ_OK;
-    snprintf(where, sizeof where, "/supports/%lld/u", (long long)support);
-    return uz_fail(err, UZ_ERR_SCENE, where,
+    return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", support, "u"),
                    "node %lld of \"%.63s\" is given %g along this normal and %g by its other supports; leave one of "
                    "them out or make them agree",
                    (long long)node, p->scene->supports[support].on, value, known);

@@ -12,11 +12,11 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,12 +105,11 @@ static uz_status number_group(uz_body_model *model, const uz_scene *scene, int64
     const uz_support *support = &scene->supports[k];
     const int dim = mesh->dim, turns = dim == 2 ? 1 : 3;
     const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
-    char where[96];
     if (!group)
         return UZ_ERR_SCENE;
     *to = (uz_rigid_group){.support = k};
     memcpy(to->point, support->about, sizeof to->point);
-    snprintf(where, sizeof where, "/supports/%lld/on", (long long)k);
+    const char *where = UZ_PLACE("supports", k, "on");
     if (!choose_anchors(to, mesh, group, model->kind))
         return uz_fail(err, UZ_ERR_SCENE, where,
                        "\"%.63s\" cannot be turned as a rigid group: it needs %s; hold it by ux, uy%s", support->on,

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -66,7 +67,6 @@ static uz_status find_sites(uz_contact_sites *sites, const uz_body_model *model,
 static uz_status add_tie(uz_entries *to, const uz_body_model *model, const uz_tie *tie, int64_t k, uz_error *err)
 {
     uz_contact_sites sites = {.n = 0};
-    char where[64];
     uz_status status = find_sites(&sites, model, tie, k, err);
     const int64_t before = to->n;
     double nearest = INFINITY;
@@ -78,10 +78,9 @@ static uz_status add_tie(uz_entries *to, const uz_body_model *model, const uz_ti
         for (int64_t q = sites.first[p]; q < sites.first[p + 1] && fabs(sites.gap[p]) <= near; q++)
             uz_entries_add(to, sites.node[q], sites.at[p], sites.area[p] * sites.weight[q]);
     }
-    snprintf(where, sizeof where, "/ties/%lld", (long long)k);
     if (status == UZ_OK && to->n == before && !to->failed)
         status =
-            uz_fail(err, UZ_ERR_SCENE, where,
+            uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("ties", k, NULL),
                     "\"%.63s\" is not near enough to \"%.63s\" to be tied: %g apart; give a tolerance, or move the "
                     "parts together",
                     tie->on, tie->to, nearest);

@@ -20,8 +20,7 @@ const char *uz_obstacle_pointer(char where[UZ_OBSTACLE_POINTER], const uz_obstac
 
 uz_status uz_obstacle_not_finite(const uz_obstacle_subject *s, const char *key, int64_t i)
 {
-    char where[UZ_OBSTACLE_POINTER];
-    return uz_fail(s->err, UZ_ERR_NOT_FINITE, uz_obstacle_pointer(where, s, key, i), "not a finite number");
+    return uz_fail(s->err, UZ_ERR_NOT_FINITE, UZ_OBSTACLE_PLACE(s, key, i), "not a finite number");
 }
 
 uz_status uz_obstacle_check_finite(const uz_obstacle_subject *s, const char *key, const double *v, int64_t n)
@@ -34,25 +33,22 @@ uz_status uz_obstacle_check_finite(const uz_obstacle_subject *s, const char *key
 
 uz_status uz_obstacle_check_direction(const uz_obstacle_subject *s, const char *key, const char *remedy)
 {
-    char where[UZ_OBSTACLE_POINTER];
     double unit[3];
     const uz_status status = uz_obstacle_check_finite(s, key, s->contact->normal, s->dim);
     if (status == UZ_OK && !uz_unit_normal(unit, s->contact->normal, s->dim))
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, -1), "%s", remedy);
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, key, -1), "%s", remedy);
     return status;
 }
 
 uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, const char *key, const char *what)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const uz_contact *c = s->contact;
     const bool heights = c->kind == UZ_OBSTACLE_HEIGHT, two = heights && s->dim == 3;
     if (c->n_x < 2 || (two && c->n_y < 2))
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, -1), "%s", what);
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, key, -1), "%s", what);
     if (!c->x || ((two || !heights) && !c->y) || (heights && !c->z))
-        return uz_fail(s->err, UZ_ERR_ARGUMENT, uz_obstacle_pointer(where, s, "", -1),
-                       "the obstacle's numbers are missing");
+        return uz_fail(s->err, UZ_ERR_ARGUMENT, UZ_OBSTACLE_PLACE(s, "", -1), "the obstacle's numbers are missing");
     if (c->n_x > INT32_MAX || c->n_y > INT32_MAX)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, -1), "too many numbers");
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, key, -1), "too many numbers");
     return UZ_OK;
 }

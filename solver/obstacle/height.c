@@ -12,11 +12,10 @@
 
 static uz_status check_ascending(const uz_obstacle_subject *s, const char *key, const double *v, int64_t n)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const uz_status status = uz_obstacle_check_finite(s, key, v, n);
     for (int64_t i = 1; i < n && status == UZ_OK; i++)
         if (!(v[i] - v[i - 1] > UZ_TOLD_APART * fmax(fabs(v[i]), fabs(v[i - 1]))))
-            return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, key, i),
+            return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, key, i),
                            "the table must ascend: %g follows %g; a step has no slope: use a polyline", v[i], v[i - 1]);
     return status;
 }
@@ -24,14 +23,14 @@ static uz_status check_ascending(const uz_obstacle_subject *s, const char *key, 
 /* n heights, `stride` apart, over the places v; `first` is the number of the first in the table. */
 static uz_status check_slopes(const uz_obstacle_subject *s, const double *v, int64_t n, int64_t first, int64_t stride)
 {
-    char where[UZ_OBSTACLE_POINTER], row[32];
+    char row[32];
     const uz_contact *c = s->contact;
     for (int64_t i = 1; i < n; i++) {
         const int64_t at = first + i * stride, line = at / c->n_x;
         if (fabs(c->z[at] - c->z[at - stride]) <= STEEPEST * (v[i] - v[i - 1]))
             continue;
         snprintf(row, sizeof row, s->dim == 3 ? "z/%lld" : "z", (long long)line);
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, row, at % c->n_x),
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, row, at % c->n_x),
                        "the table rises from %g to %g within %g, as good as a step; the steepest slope is %g%s",
                        c->z[at - stride], c->z[at], v[i] - v[i - 1], STEEPEST,
                        s->dim == 2 ? "; a polyline may be vertical" : "");
@@ -41,15 +40,14 @@ static uz_status check_slopes(const uz_obstacle_subject *s, const double *v, int
 
 static uz_status check(const uz_obstacle_subject *s)
 {
-    char where[UZ_OBSTACLE_POINTER], row[32];
+    char row[32];
     const uz_contact *c = s->contact;
     uz_status status;
     if (s->dim == 2 && c->n_y != 0)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "y", -1),
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "y", -1),
                        "a plane model takes heights over x alone; leave y out");
     if (s->dim == 3 && c->n_y == 0)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "", -1),
-                       "heights of a solid model need y, too");
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "", -1), "heights of a solid model need y, too");
     status = uz_obstacle_check_lists(s, s->dim == 2 || c->n_x < 2 ? "x" : "y", "a table needs two places at least");
     if (status == UZ_OK)
         status = check_ascending(s, "x", c->x, c->n_x);

@@ -3,10 +3,10 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,16 +41,14 @@ uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t 
 {
     const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
     const uz_obstacle_subject s = {shape, contact, index, model == UZ_SOLID ? 3 : 2, err};
-    char where[UZ_OBSTACLE_POINTER];
     *out = NULL;
     if (contact->kind == UZ_OBSTACLE_BODY)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "a body of the mesh is no rigid obstacle");
     if (!shape) {
-        snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)index);
-        return uz_fail(err, UZ_ERR_ARGUMENT, where, "unknown kind of obstacle");
+        return uz_fail(err, UZ_ERR_ARGUMENT, UZ_PLACE("contacts", index, "obstacle"), "unknown kind of obstacle");
     }
     if (shape->refused[s.dim - 2])
-        return uz_fail(err, UZ_ERR_SCENE, uz_obstacle_pointer(where, &s, "", -1), "%s", shape->refused[s.dim - 2]);
+        return uz_fail(err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(&s, "", -1), "%s", shape->refused[s.dim - 2]);
     uz_status status = shape->check(&s);
     if (status != UZ_OK)
         return status;
@@ -114,9 +112,8 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
         scaled.foot[c] /= o->scale;
     const double sum = scaled.gap + scaled.normal[0] + scaled.normal[1] + scaled.normal[2];
     if (!finite || !isfinite(sum) || isnan(scaled.curvature)) {
-        char where[96];
-        snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)o->index);
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
+        return uz_fail(err, UZ_ERR_NOT_FINITE, UZ_PLACE("contacts", o->index, "obstacle"),
+                       "the gap to this obstacle overflows");
     }
     *out = scaled;
     return UZ_OK;

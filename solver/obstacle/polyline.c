@@ -3,13 +3,13 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "obstacle/pieces.h"
+#include "scene/check.h"
 
 #include <math.h>
 #include <stdio.h>
 
 static uz_status check(const uz_obstacle_subject *s)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const uz_contact *c = s->contact;
     const uz_status status = uz_obstacle_check_lists(s, "points", "a polyline needs two points at least");
     if (status != UZ_OK)
@@ -21,19 +21,19 @@ static uz_status check(const uz_obstacle_subject *s)
             continue;
         const double size = fmax(fmax(fabs(c->x[i]), fabs(c->x[i - 1])), fmax(fabs(c->y[i]), fabs(c->y[i - 1])));
         if (hypot(c->x[i] - c->x[i - 1], c->y[i] - c->y[i - 1]) <= UZ_TOLD_APART * size)
-            return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "points", i),
+            return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "points", i),
                            "point %lld repeats the one before it, (%g, %g); leave it out", (long long)i, c->x[i],
                            c->y[i]);
     }
     if (c->n_x == 3 && c->x[0] == c->x[2] && c->y[0] == c->y[2])
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "points", 2),
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "points", 2),
                        "a closed line needs three different points at least");
     return UZ_OK;
 }
 
 static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
 {
-    char where[96], of[2][64];
+    char of[2][64];
     int64_t pair[2];
     uz_line *line = o->own = uz_alloc_zero(1, sizeof *line);
     if (!line)
@@ -47,9 +47,8 @@ static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
                      (long long)(pair[k] == 0 ? 0 : line->n - 1));
         else
             snprintf(of[k], sizeof of[k], "the segment from point %lld", (long long)pair[k] - 1);
-    snprintf(where, sizeof where, "/contacts/%lld/obstacle/polyline/points", (long long)o->index);
     return uz_fail(
-        err, UZ_ERR_SCENE, where,
+        err, UZ_ERR_SCENE, UZ_PLACE("contacts", o->index, "obstacle/polyline/points"),
         "the line meets itself: %s and %s; it must have the obstacle on its right everywhere. Move its points, "
         "or end it where it began to close it",
         of[0], of[1]);

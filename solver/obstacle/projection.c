@@ -6,10 +6,10 @@
 #include "core/vector3.h"
 #include "obstacle/box_tree.h"
 #include "obstacle/face_point.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -313,7 +313,6 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
     enum { MOST_AROUND = 48 };
     double x[3] = {0}, normal[MOST_AROUND][3];
     uz_own_place at = *own;
-    char where[96];
     for (int c = 0; c < m->mesh->dim; c++)
         x[c] = m->mesh->xyz[node * m->mesh->dim + c] * m->scale;
     at.node = &node;
@@ -326,9 +325,9 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
         at.element = slave->group->face[slave->around[q]].element;
     }
     if (!place_on(found, row, m, x, own->own ? &at : NULL)) {
-        snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
-        return uz_fail(err, UZ_ERR_SCENE, where, "the face at node %lld of \"%.63s\" has no area, and so no normal",
-                       (long long)row->master[0], m->group->name);
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", index, "with"),
+                       "the face at node %lld of \"%.63s\" has no area, and so no normal", (long long)row->master[0],
+                       m->group->name);
     }
     row->node = node;
     /* Where all faces of the slave around its node look the way the master does, what is behind the master there is
@@ -346,10 +345,8 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
 uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
                                 uz_error *err)
 {
-    char where[96];
-    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
     if (with->kind != UZ_GROUP_FACES || with->n_faces < 1)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", index, "with"),
                        "\"%.63s\" has no faces; the other body is given by the %s that can be touched", with->name,
                        "edges or faces");
     if (on == with)
@@ -363,7 +360,6 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
         for (int i = 0; i < count; i++)
             of_master[node[i]] = 1;
     }
-    snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
     int itself = -1;
     for (int64_t i = 0; i < uz_group_node_count(mesh, on) && status == UZ_OK && itself != 1; i++) {
         if (!of_master[uz_group_node_at(on, i)])
@@ -372,7 +368,7 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
         if (itself < 0)
             status = uz_no_memory(err, OF_BODIES);
         else if (itself == 0)
-            status = uz_fail(err, UZ_ERR_SCENE, where,
+            status = uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", index, "on"),
                              "node %lld is in \"%.63s\" and on the faces of \"%.63s\"; the two bodies must have nodes "
                              "of their own where they touch",
                              (long long)uz_group_node_at(on, i), on->name, with->name);
@@ -426,7 +422,6 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
 {
     master m = {.mesh = NULL}, slave = {.mesh = NULL};
     uz_contact_pair *row = NULL;
-    char where[96];
     *out = NULL;
     *count = 0;
     uz_status status = uz_contact_pair_check(mesh, on, with, index, err);
@@ -443,10 +438,9 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
             *count += found;
         }
     if (status == UZ_OK && *count == 0 && !may_miss) {
-        snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
         status =
-            uz_fail(err, UZ_ERR_SCENE, where, "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border",
-                    on->name, with->name);
+            uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", index, "on"),
+                    "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border", on->name, with->name);
     }
     if (status == UZ_OK)
         *out = row;

@@ -15,14 +15,13 @@ static const double PI = 3.14159265358979;
 
 static uz_status check(const uz_obstacle_subject *s)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const bool cylinder = s->shape == &uz_shape_cylinder;
     const double radius = s->contact->radius;
     uz_status status = UZ_OK;
     if (!isfinite(radius))
         return uz_obstacle_not_finite(s, "radius", -1);
     if (radius <= 0)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "radius", -1),
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "radius", -1),
                        "the radius must be positive; it is %g", radius);
     if (cylinder)
         status = uz_obstacle_check_direction(s, "axis", "the axis has no direction: it is zero");

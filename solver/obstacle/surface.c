@@ -17,15 +17,13 @@
 
 static uz_status check(const uz_obstacle_subject *s)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const uz_contact *c = s->contact;
     if (c->n_x < 3 || c->n_x % 3 != 0)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "", -1), "a surface has triangles");
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "", -1), "a surface has triangles");
     if (!c->x || !c->y || !c->z)
-        return uz_fail(s->err, UZ_ERR_ARGUMENT, uz_obstacle_pointer(where, s, "", -1),
-                       "the obstacle's numbers are missing");
+        return uz_fail(s->err, UZ_ERR_ARGUMENT, UZ_OBSTACLE_PLACE(s, "", -1), "the obstacle's numbers are missing");
     if (c->n_x > INT32_MAX)
-        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "", -1), "too many triangles");
+        return uz_fail(s->err, UZ_ERR_SCENE, UZ_OBSTACLE_PLACE(s, "", -1), "too many triangles");
     uz_status status = uz_obstacle_check_finite(s, "", c->x, c->n_x);
     if (status == UZ_OK)
         status = uz_obstacle_check_finite(s, "", c->y, c->n_x);
@@ -34,13 +32,12 @@ static uz_status check(const uz_obstacle_subject *s)
 
 static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
 {
-    char where[UZ_OBSTACLE_POINTER];
     const uz_obstacle_subject s = {.shape = o->shape, .contact = c, .index = o->index, .dim = o->dim};
     o->own = uz_alloc_zero(1, sizeof(uz_triangulation));
     if (!o->own)
         return uz_no_memory(err, "an obstacle");
     return uz_triangulation_init(o->own, c->n_x / 3, c->x, c->y, c->z, o->scale, c->inside,
-                                 uz_obstacle_pointer(where, &s, "", -1), err);
+                                 UZ_OBSTACLE_PLACE(&s, "", -1), err);
 }
 
 static void clear(uz_obstacle *o)

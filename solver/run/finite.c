@@ -15,10 +15,10 @@
 #include "run/results.h"
 #include "run/settings.h"
 #include "run/solve.h"
+#include "scene/check.h"
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -151,7 +151,6 @@ static uz_status check_tie(const uz_body_model *base, const uz_group *group, int
         for (int a = 0; a < count; a++)
             for (int b = 0; b < a && uz_is_tied(base, node[a]); b++) {
                 double off[2][3], square = 0;
-                char where[96];
                 if (!uz_is_tied(base, node[b]))
                     continue;
                 find_offset(off[0], base, node[a]);
@@ -160,9 +159,8 @@ static uz_status check_tie(const uz_body_model *base, const uz_group *group, int
                     square += (off[0][c] - off[1][c]) * (off[0][c] - off[1][c]);
                 const double strain =
                     sqrt(square / uz_distance2(base->mesh.xyz + dim * node[a], base->mesh.xyz + dim * node[b], dim));
-                snprintf(where, sizeof where, "/ties/%lld", (long long)tie);
                 if (strain > MOST_TIED)
-                    return uz_fail(err, UZ_ERR_SCENE, where,
+                    return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("ties", tie, NULL),
                                    "the tied surfaces do not lie on each other: near node %lld turning would strain "
                                    "them by %.2g; finite kinematics need less than %.2g: use finer meshes along the "
                                    "tie, quad8, tri6, hex20 or tet10 where it is curved, or the kinematics \"moving\"",
@@ -186,12 +184,11 @@ static uz_status check_ties(const uz_body_model *base, const uz_scene *scene, uz
 /* What checks of the scene alone could not see. */
 static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz_error *err)
 {
-    char where[96];
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         const uz_contact *contact = &scene->contacts[k];
         if (contact->kind != UZ_OBSTACLE_BODY)
             continue;
-        snprintf(where, sizeof where, "/contacts/%lld/with", (long long)k);
+        const char *where = UZ_PLACE("contacts", k, "with");
         const uz_group *on = uz_mesh_group(&base->mesh, contact->on, where, err);
         const uz_group *with = uz_mesh_group(&base->mesh, contact->with, where, err);
         const int shared = on && with ? uz_groups_share_face(&base->mesh, on, with) : 0;

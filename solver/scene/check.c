@@ -15,20 +15,22 @@ const char *uz_check_place(char where[UZ_CHECK_POINTER], const char *list, int64
     return where;
 }
 
-const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
-                               int64_t i, const char *key, uz_error *err)
+const uz_group *uz_check_group(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                               uz_error *err)
 {
-    const uz_group *group = uz_mesh_group(mesh, on, uz_check_place(where, list, i, key), err);
+    const char *where = UZ_PLACE(list, i, key);
+    const uz_group *group = uz_mesh_group(mesh, on, where, err);
     if (!group || uz_group_node_count(mesh, group) > 0)
         return group;
     uz_fail(err, UZ_ERR_SCENE, where, "the group \"%s\" has no node that belongs to an element", group->name);
     return NULL;
 }
 
-const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
-                               int64_t i, const char *key, const char *remedy, uz_error *err)
+const uz_group *uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                               const char *remedy, uz_error *err)
 {
-    const uz_group *group = uz_check_group(where, mesh, on, list, i, key, err);
+    const char *where = UZ_PLACE(list, i, key);
+    const uz_group *group = uz_check_group(mesh, on, list, i, key, err);
     if (!group || group->kind == UZ_GROUP_FACES)
         return group;
     if (group->everything)
@@ -42,10 +44,9 @@ const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh
 
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     if (isfinite(value))
         return UZ_OK;
-    return uz_fail(err, UZ_ERR_NOT_FINITE, uz_check_place(where, list, i, key), "not a finite number");
+    return uz_fail(err, UZ_ERR_NOT_FINITE, UZ_PLACE(list, i, key), "not a finite number");
 }
 
 uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err)
@@ -63,10 +64,9 @@ uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i,
 
 static uz_status check_tie(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_tie *tie = &scene->ties[i];
     for (int k = 0; k < 2; k++)
-        if (!uz_check_sides(where, mesh, k == 0 ? tie->on : tie->to, "ties", i, k == 0 ? "on" : "to",
+        if (!uz_check_sides(mesh, k == 0 ? tie->on : tie->to, "ties", i, k == 0 ? "on" : "to",
                             "surfaces are tied: name sides", err))
             return UZ_ERR_SCENE;
     return uz_check_number(tie->tolerance, "ties", i, "tolerance", err);
@@ -148,14 +148,13 @@ static const char *const LOAD_KEY[UZ_LOAD_KINDS] = {
 /* A load on elements is multiplied by a number of their materials, which some of them must have. */
 static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_load *load = &scene->loads[i];
-    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    const uz_group *group = uz_check_group(mesh, load->on, "loads", i, "on", err);
     bool density = false, expansion = false;
     if (!group)
         return UZ_ERR_SCENE;
     if (group->kind != UZ_GROUP_ELEMENTS)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "on"),
                        "the group \"%s\" is not made of elements, and %s acts on elements: use \"all\"", group->name,
                        LOAD_KEY[load->kind]);
     for (int64_t k = 0; k < scene->n_materials; k++) {
@@ -163,10 +162,10 @@ static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, i
         expansion = expansion || uz_expands(&scene->materials[k]);
     }
     if (load->kind == UZ_LOAD_GRAVITY && !density)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "gravity"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "gravity"),
                        "no material has a density; give one, or use body_force");
     if (load->kind == UZ_LOAD_TEMPERATURE && !expansion)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "temperature"),
                        "no material has an expansion, so that a temperature does nothing");
     return UZ_OK;
 }
@@ -174,9 +173,8 @@ static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, i
 /* On sides, or on points: what a load on a part of the boundary may be. */
 static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, uz_model kind, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     if (load->kind == UZ_LOAD_NODE_FORCE) {
-        uz_check_place(where, "loads", i, "node");
+        const char *where = UZ_PLACE("loads", i, "node");
         if (mesh->n_unused > 0)
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "%lld nodes of the file belong to no element and are left out, so that numbers are not "
@@ -190,15 +188,15 @@ static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, uz_
     const bool pressure = load->kind == UZ_LOAD_PRESSURE;
     const uz_group *group =
         load->kind == UZ_LOAD_FORCE
-            ? uz_check_group(where, mesh, load->on, "loads", i, "on", err)
-            : uz_check_sides(where, mesh, load->on, "loads", i, "on",
+            ? uz_check_group(mesh, load->on, "loads", i, "on", err)
+            : uz_check_sides(mesh, load->on, "loads", i, "on",
                              pressure ? "a pressure is a force per area of boundary: name the sides that it pushes"
                                       : "a traction is a force per area of boundary: name the sides that it pulls",
                              err);
     if (!group)
         return UZ_ERR_SCENE;
     if (group->kind == UZ_GROUP_ELEMENTS)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "on"),
                        "the group \"%s\" is made of elements; a force is spread over sides or nodes: use body_force "
                        "(force per volume), or name sides",
                        group->name);
@@ -208,11 +206,11 @@ static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, uz_
             return uz_check_vector(vector, 3, "loads", i, c < 3 ? "at" : "moment", err);
     }
     if (load->has_point && kind == UZ_AXISYMMETRIC)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, NULL),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, NULL),
                        "in a body of revolution forces are of the whole ring, at its axis, and there are no moments: "
                        "leave at and moment out");
     if (pressure && group->n_inner > 0)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "on"),
                        "%lld faces of \"%s\" lie between two elements, where there is no outward normal; use a "
                        "traction, or leave them out",
                        (long long)group->n_inner, group->name);
@@ -221,14 +219,13 @@ static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, uz_
 
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     uz_status status = check_supports_and_contacts(scene, mesh, err);
     if (status == UZ_OK)
         status = uz_check_finite_loads(scene, mesh, err);
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
         const uz_load *load = &scene->loads[i];
         if (load->kind >= UZ_LOAD_KINDS)
-            return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "loads", i, NULL), "an unknown kind of load");
+            return uz_fail(err, UZ_ERR_ARGUMENT, UZ_PLACE("loads", i, NULL), "an unknown kind of load");
         if (load->kind == UZ_LOAD_BODY_FORCE || load->kind == UZ_LOAD_GRAVITY || load->kind == UZ_LOAD_TEMPERATURE)
             status = check_on_elements(scene, mesh, i, err);
         else

@@ -6,15 +6,17 @@
 
 enum { UZ_CHECK_POINTER = 96 };
 
-/* "/materials/0/poisson"; key NULL: "/materials/0". Returns `where`. */
+/* "/materials/0/poisson"; key NULL: "/materials/0". Returns `where`. UZ_PLACE: in memory of the block that it stands
+ * in. */
 const char *uz_check_place(char where[UZ_CHECK_POINTER], const char *list, int64_t i, const char *key);
+#define UZ_PLACE(list, i, key) uz_check_place((char[UZ_CHECK_POINTER]){""}, list, i, key)
 
-/* The group `on` of an item, with at least one node; NULL: refused. `where` is then its pointer. */
-const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
-                               int64_t i, const char *key, uz_error *err);
+/* The group `on` of an item, with at least one node; NULL: refused, at UZ_PLACE(list, i, key). */
+const uz_group *uz_check_group(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                               uz_error *err);
 /* The same, and it must be made of faces. remedy: what to name instead. */
-const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
-                               int64_t i, const char *key, const char *remedy, uz_error *err);
+const uz_group *uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                               const char *remedy, uz_error *err);
 /* Each of dim components must be finite; key is "traction", "obstacle/plane/point", ... */
 uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err);
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err);

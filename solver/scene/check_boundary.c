@@ -37,10 +37,9 @@ static uz_status check_direction(const double normal[3], int dim, const char *li
                                  const char *meaning, uz_error *err)
 {
     double unit[3];
-    char where[UZ_CHECK_POINTER];
     uz_status status = uz_check_vector(normal, dim, list, i, key, err);
     if (status == UZ_OK && !uz_unit_normal(unit, normal, dim))
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, list, i, key), "the normal is zero; %s", meaning);
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE(list, i, key), "the normal is zero; %s", meaning);
     return status;
 }
 
@@ -60,7 +59,6 @@ double uz_support_angle(const uz_support *support)
 
 static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
     const double *turn = support->turn, angle = hypot(hypot(turn[0], turn[1]), turn[2]);
     uz_status status = uz_check_vector(support->about, 3, "supports", i, "rotation/about", err);
@@ -69,14 +67,14 @@ static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
     if (status != UZ_OK)
         return status;
     if (scene->model == UZ_AXISYMMETRIC)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, "rotation"),
                        "a body of revolution stays one, and nothing of it can rotate; prescribe ux and uy, or mesh it "
                        "as a solid");
     if (scene->model != UZ_SOLID && (turn[0] != 0 || turn[1] != 0))
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation/axis"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, "rotation/axis"),
                        "a plane body rotates about z only; leave the axis out");
     if (angle > UZ_MOST_LINEAR_TURN && !uz_may_be_finite(scene))
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rotation/angle"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, "rotation/angle"),
                        "a rotation by %g degrees is not small, and small deformation would stretch the group by %.2g "
                        "%%; use a law of finite strain (st_venant_kirchhoff, neo_hooke) with the kinematics "
                        "\"finite\", or at most %.3g degrees",
@@ -88,7 +86,6 @@ static uz_status check_turn(const uz_scene *scene, int64_t i, uz_error *err)
 static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
 {
     static const char *const KEYS[] = {"rigid/ux", "rigid/uy", "rigid/uz", "rigid/rx", "rigid/ry", "rigid/rz"};
-    char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
     const bool ring = scene->model == UZ_AXISYMMETRIC, plane = scene->model != UZ_SOLID;
     double angle = 0;
@@ -97,7 +94,7 @@ static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
         return status;
     for (int k = 0; k < 6; k++) {
         const double value = k < 3 ? support->u[k] : support->turn[k - 3];
-        uz_check_place(where, "supports", i, KEYS[k]);
+        const char *where = UZ_PLACE("supports", i, KEYS[k]);
         if (isnan(value))
             continue;
         if (isinf(value))
@@ -123,26 +120,25 @@ static uz_status check_rigid(const uz_scene *scene, int64_t i, uz_error *err)
 
 uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
     const int dim = mesh->dim;
     bool any = false;
     uz_status status;
-    if (!uz_check_group(where, mesh, support->on, "supports", i, "on", err))
+    if (!uz_check_group(mesh, support->on, "supports", i, "on", err))
         return UZ_ERR_SCENE;
     switch (support->kind) {
     case UZ_SUPPORT_COMPONENTS:
         for (int c = 0; c < dim; c++) {
             const char key[3] = {'u', "xyz"[c], '\0'};
             if (isinf(support->u[c]))
-                return uz_fail(err, UZ_ERR_NOT_FINITE, uz_check_place(where, "supports", i, key),
+                return uz_fail(err, UZ_ERR_NOT_FINITE, UZ_PLACE("supports", i, key),
                                "the prescribed displacement is not a finite number");
             any = any || !isnan(support->u[c]);
         }
         if (any && uz_support_turns(support))
             return check_turn(scene, i, err);
         return any ? UZ_OK
-                   : uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, NULL),
+                   : uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, NULL),
                              "this support holds no direction; give %s",
                              dim == 2 ? "ux, uy or both" : "ux, uy, uz or some");
     case UZ_SUPPORT_NORMAL:
@@ -155,29 +151,28 @@ uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i
         for (int c = 0; c < dim; c++) {
             const char key[] = {'s', 'p', 'r', 'i', 'n', 'g', '/', (char)('0' + c), '\0'};
             if (support->spring[c] < 0)
-                return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, key),
+                return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, key),
                                "a stiffness must not be negative; it is %g", support->spring[c]);
             any = any || support->spring[c] > 0;
         }
         if (!any)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, "spring"),
                            "this spring has no stiffness in any direction");
-        if (!uz_check_sides(where, mesh, support->on, "supports", i, "on",
+        if (!uz_check_sides(mesh, support->on, "supports", i, "on",
                             "a spring is spread over sides by area: name the sides that stand on it", err))
             return UZ_ERR_SCENE;
         return UZ_OK;
     case UZ_SUPPORT_RIGID:
         return check_rigid(scene, i, err);
     }
-    return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "supports", i, NULL), "an unknown kind of support");
+    return uz_fail(err, UZ_ERR_ARGUMENT, UZ_PLACE("supports", i, NULL), "an unknown kind of support");
 }
 
 /* A side that may touch has an outside. */
 static uz_status check_contact_side(const uz_mesh *mesh, const char *on, int64_t i, const char *key, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_group *group = uz_check_sides(
-        where, mesh, on, "contacts", i, key,
+        mesh, on, "contacts", i, key,
         mesh->dim == 2
             ? "name the side that can touch: left, right, bottom or top in a box, a group of edges in other meshes"
             : "name the side that can touch: a side of a box, a group of faces in other meshes",
@@ -185,7 +180,7 @@ static uz_status check_contact_side(const uz_mesh *mesh, const char *on, int64_t
     if (!group)
         return UZ_ERR_SCENE;
     if (group->n_inner > 0)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, key),
                        "%lld faces of \"%s\" lie between two elements, where nothing can touch; leave them out",
                        (long long)group->n_inner, group->name);
     return UZ_OK;
@@ -204,7 +199,6 @@ static bool has_any(const unsigned char *sides, const uz_mesh *mesh, const char 
 /* Two contacts of the same sides would divide their pressure between them at will. */
 static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_contact *mine = &scene->contacts[i];
     const char *const name[2] = {mine->on, mine->with};
     unsigned char *const of[2] = {uz_alloc_zero(mesh->n_elements, 1), uz_alloc_zero(mesh->n_elements, 1)};
@@ -220,7 +214,7 @@ static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, in
         if (its->kind == UZ_OBSTACLE_BODY && ((has_any(of[0], mesh, its->on) && has_any(of[1], mesh, its->with)) ||
                                               (has_any(of[1], mesh, its->on) && has_any(of[0], mesh, its->with))))
             status =
-                uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, NULL),
+                uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, NULL),
                         "sides of \"%.40s\" and \"%.40s\" that may touch here may do so by contact %lld (\"%.40s\" "
                         "and \"%.40s\"), too; name each pair once, several in one contact as lists",
                         mine->on, mine->with, (long long)k, its->on, its->with);

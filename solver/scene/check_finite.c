@@ -34,15 +34,14 @@ bool uz_may_be_finite(const uz_scene *scene)
 static uz_status check_laws(const uz_scene *scene, uz_error *err)
 {
     const bool finite = uz_may_be_finite(scene);
-    char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_materials; i++) {
         const uz_elasticity law = scene->materials[i].law;
-        uz_check_place(where, "materials", i, "law");
+        const char *where = UZ_PLACE("materials", i, "law");
         if (law >= UZ_ELASTICITIES)
             return uz_fail(err, UZ_ERR_SCENE, where,
                            "unknown law; use linear, st_venant_kirchhoff, neo_hooke or neo_hooke_isochoric");
         if (finite && scene->materials[i].is_orthotropic)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "orthotropic"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "orthotropic"),
                            "orthotropic materials are linear, which says nothing of finite strain: use the kinematics "
                            "\"moving\", or isotropic ones, all of such a law");
         if (finite && law == UZ_ELASTIC_LINEAR)
@@ -62,16 +61,15 @@ static uz_status check_laws(const uz_scene *scene, uz_error *err)
 static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
 {
     const uz_contact *contact = &scene->contacts[i];
-    char where[UZ_CHECK_POINTER];
     if (contact->between != UZ_CONTACT_SURFACES)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "discretization"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "discretization"),
                        "finite kinematics have contact between bodies by surfaces; leave discretization out");
     if (!contact->faceted && !scene->compared && uz_may_be_finite(scene))
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "smooth"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "smooth"),
                        "finite kinematics take sides of bodies as they are deformed; leave smooth out, and use quad8 "
                        "or tri6 where surfaces are curved");
     if (strcmp(contact->on, contact->with) == 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "with"),
                        "finite kinematics have no contact of a surface with itself; name two surfaces");
     return UZ_OK;
 }
@@ -79,10 +77,9 @@ static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
 /* Whatever its laws. */
 static uz_status check_body(const uz_scene *scene, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_materials && scene->model == UZ_PLANE_STRESS; i++)
         if (scene->materials[i].poisson == 0.5)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "poisson"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "poisson"),
                            "finite kinematics have no material that keeps its volume; use less than 0.5, such as 0.49");
     if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
@@ -96,7 +93,7 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
             moved += !isnan(support->turn[c]) && support->turn[c] != 0;
         }
         if (held == 1 || (held == 2 && moved > 0))
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "rigid"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("supports", i, "rigid"),
                            "large rotations about several axes are no sum, so that one of them alone is not told by a "
                            "number: hold rx, ry and rz, or none, or two at 0");
     }
@@ -105,12 +102,12 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         if (status != UZ_OK)
             return status;
         if (scene->contacts[i].kind == UZ_OBSTACLE_SURFACE)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/surface"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "obstacle/surface"),
                            "finite kinematics of solids have planes, spheres and cylinders for obstacles; use these, "
                            "or the kinematics \"moving\"");
         if (scene->contacts[i].kind == UZ_OBSTACLE_HEIGHT && scene->model == UZ_SOLID) /* cells between values bend */
             return uz_fail(
-                err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "obstacle/height"),
+                err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "obstacle/height"),
                 "finite kinematics of solids have planes, spheres and cylinders for obstacles; use these, or "
                 "the kinematics \"moving\"");
     }
@@ -145,7 +142,6 @@ static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *m
 /* mesh NULL: what does not depend on it. */
 static uz_status check_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const double *moment = scene->loads[i].moment;
         const uz_group *group = scene->loads[i].has_point && mesh ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL)
@@ -156,17 +152,17 @@ static uz_status check_loads(const uz_scene *scene, const uz_mesh *mesh, uz_erro
         if (status != UZ_OK)
             return status;
         if (!rigid)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "at"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "at"),
                            "a point goes with a group of up to %d nodes, which it couples, and \"%.63s\" has %lld: "
                            "name a part of it, or make it rigid by a support",
                            MOST_POINT_NODES, scene->loads[i].on, (long long)nodes);
         if (scene->loads[i].has_point && scene->model == UZ_SOLID && uz_dot3(moment, moment) > 0)
             return uz_fail(
-                err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "moment"),
+                err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "moment"),
                 "the work of a moment that keeps its direction depends on the way in space: put two opposite "
                 "forces at points of the group or beside it, or turn it by rx, ry and rz as a rigid group");
         if (scene->loads[i].kind == UZ_LOAD_TEMPERATURE && !uz_may_be_finite(scene))
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("loads", i, "temperature"),
                            "small deformation of the linear law is not compared with large where there is temperature");
     }
     return UZ_OK;

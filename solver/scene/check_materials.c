@@ -32,7 +32,7 @@ static uz_status check_components(const uz_orthotropic *own, int64_t i, uz_error
                  {"poisson", own->poisson, false},
                  {"shear", own->shear, true},
                  {"expansion", own->expansion, false}};
-    char key[40], where[UZ_CHECK_POINTER];
+    char key[40];
     for (size_t k = 0; k < sizeof LISTS / sizeof LISTS[0]; k++)
         for (int c = 0; c < 3; c++) {
             snprintf(key, sizeof key, "orthotropic/%s/%d", LISTS[k].key, c);
@@ -40,8 +40,8 @@ static uz_status check_components(const uz_orthotropic *own, int64_t i, uz_error
             if (status != UZ_OK)
                 return status;
             if (LISTS[k].modulus && !(LISTS[k].value[c] > 0))
-                return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, key),
-                               "a modulus must be positive; it is %g", LISTS[k].value[c]);
+                return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, key), "a modulus must be positive; it is %g",
+                               LISTS[k].value[c]);
         }
     return UZ_OK;
 }
@@ -51,13 +51,13 @@ static uz_status check_energy(const uz_orthotropic *own, int64_t i, uz_error *er
 {
     static const char *const PAIRS[] = {"xy", "yz", "xz"};
     static const int OF[3][2] = {{0, 1}, {1, 2}, {0, 2}};
-    char key[40], where[UZ_CHECK_POINTER];
+    char key[40];
     double pair[3];
     const double energy = uz_orthotropic_energy(pair, own);
     for (int k = 0; k < 3; k++) {
         snprintf(key, sizeof key, "orthotropic/poisson/%d", k);
         if (!(pair[k] > 0))
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, key),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, key),
                            "Poisson's ratio %s is %g, and with these moduli must be less than %g in magnitude, or "
                            "some strain would set energy free; it is the strain along %c under a pull along %c: if "
                            "it was measured the other way round, multiply it by young %c / young %c",
@@ -66,7 +66,7 @@ static uz_status check_energy(const uz_orthotropic *own, int64_t i, uz_error *er
     }
     if (!(energy > LEAST_ENERGY))
         return uz_fail(
-            err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "orthotropic/poisson"),
+            err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "orthotropic/poisson"),
             "Poisson's ratios %g, %g, %g (xy, yz, xz) do not go with each other: some strain would set energy "
             "free or cost none, as 1 - nu_xy nu_yx - nu_yz nu_zy - nu_xz nu_zx - 2 nu_yx nu_zy nu_xz is %g "
             "and must be positive; make them smaller",
@@ -76,7 +76,6 @@ static uz_status check_energy(const uz_orthotropic *own, int64_t i, uz_error *er
 
 static uz_status check_axes(const uz_scene *scene, const uz_orthotropic *own, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     double unit[2][3], along = 0;
     bool any = false;
     uz_status status = UZ_OK;
@@ -88,16 +87,15 @@ static uz_status check_axes(const uz_scene *scene, const uz_orthotropic *own, in
         return status;
     for (int k = 0; k < 2; k++)
         if (!uz_unit_normal(unit[k], own->axes[k], 3))
-            return uz_fail(err, UZ_ERR_SCENE,
-                           uz_check_place(where, "materials", i, k ? "orthotropic/axes/y" : "orthotropic/axes/x"),
+            return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, k ? "orthotropic/axes/y" : "orthotropic/axes/x"),
                            "the direction is zero; it must be that of the material's %c", k ? 'y' : 'x');
     for (int c = 0; c < 3; c++)
         along += unit[0][c] * unit[1][c];
     if (fabs(along) > ACROSS)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "orthotropic/axes/y"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "orthotropic/axes/y"),
                        "x and y of the material are not across each other: the cosine of their angle is %g", along);
     if (scene->model != UZ_SOLID && (unit[0][2] != 0 || unit[1][2] != 0))
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "orthotropic/axes"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "orthotropic/axes"),
                        "of a plane body and of one of revolution the material's z is across the plane; turn x and y in "
                        "it, by an angle");
     return UZ_OK;
@@ -106,15 +104,14 @@ static uz_status check_axes(const uz_scene *scene, const uz_orthotropic *own, in
 static uz_status check_orthotropic(const uz_scene *scene, int64_t i, uz_error *err)
 {
     const uz_material *material = &scene->materials[i];
-    char where[UZ_CHECK_POINTER];
     if (material->law != UZ_ELASTIC_LINEAR)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "law"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "law"),
                        "orthotropic materials are of the linear law; leave it out");
     if (material->yield != 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "yield"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "yield"),
                        "von Mises' stress says nothing about when an orthotropic material yields; leave it out");
     if (material->expansion != 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "expansion"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "expansion"),
                        "an orthotropic material has an expansion along each of its axes; give orthotropic.expansion");
     uz_status status = check_components(&material->orthotropic, i, err);
     if (status == UZ_OK)
@@ -127,15 +124,14 @@ static uz_status check_isotropic(const uz_scene *scene, int64_t i, uz_error *err
 static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
 {
     const uz_material *material = &scene->materials[i];
-    char where[UZ_CHECK_POINTER];
     uz_status status = uz_check_number(material->density, "materials", i, "density", err);
     if (status == UZ_OK && material->density < 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "density"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "density"),
                        "a density must not be negative; it is %g", material->density);
     if (status == UZ_OK)
         status = uz_check_number(material->yield, "materials", i, "yield", err);
     if (status == UZ_OK && material->yield < 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "yield"),
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "yield"),
                        "a yield stress must not be negative; it is %g", material->yield);
     if (status == UZ_OK)
         status = uz_check_number(material->expansion, "materials", i, "expansion", err);
@@ -148,31 +144,32 @@ static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
 static uz_status check_isotropic(const uz_scene *scene, int64_t i, uz_error *err)
 {
     static const char *const NAMES[] = {"", "in plane strain", "in a body of revolution", "in a solid"};
-    char where[UZ_CHECK_POINTER];
     const uz_material *material = &scene->materials[i];
     const double young = material->young, poisson = material->poisson;
-    uz_check_place(where, "materials", i, "young");
     if (!isfinite(young))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Young's modulus is not a finite number");
+        return uz_fail(err, UZ_ERR_NOT_FINITE, UZ_PLACE("materials", i, "young"),
+                       "Young's modulus is not a finite number");
     if (young <= 0)
-        return uz_fail(err, UZ_ERR_SCENE, where, "Young's modulus must be positive; it is %g", young);
-    uz_check_place(where, "materials", i, "poisson");
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "young"),
+                       "Young's modulus must be positive; it is %g", young);
     if (!isfinite(poisson))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Poisson's ratio is not a finite number");
+        return uz_fail(err, UZ_ERR_NOT_FINITE, UZ_PLACE("materials", i, "poisson"),
+                       "Poisson's ratio is not a finite number");
     if (poisson == 0.5 && scene->model != UZ_PLANE_STRESS)
-        return uz_fail(err, UZ_ERR_SCENE, where,
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "poisson"),
                        "Poisson's ratio 0.5 makes the body infinitely stiff %s; use less, such as 0.49",
                        NAMES[scene->model]);
     if (poisson <= -1 || poisson > 0.5)
-        return uz_fail(err, UZ_ERR_SCENE, where, "Poisson's ratio must lie between -1 and 0.5; it is %g", poisson);
+        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "poisson"),
+                       "Poisson's ratio must lie between -1 and 0.5; it is %g", poisson);
     return UZ_OK;
 }
 
 /* Gives the elements of one material their number. of: n_elements, -1 where there is none yet. */
 static uz_status cover(int32_t *of, const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
-    const uz_group *group = uz_check_group(where, mesh, scene->materials[i].on, "materials", i, "on", err);
+    const char *where = UZ_PLACE("materials", i, "on");
+    const uz_group *group = uz_check_group(mesh, scene->materials[i].on, "materials", i, "on", err);
     if (!group)
         return UZ_ERR_SCENE;
     if (group->kind != UZ_GROUP_ELEMENTS)

@@ -105,11 +105,10 @@ uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *er
         const uz_contact *contact = &scene->contacts[k / 2];
         const uz_names *names = k % 2 == 0 ? &contact->on_groups : &contact->with_groups;
         const char *name = k % 2 == 0 ? contact->on : contact->with;
-        char where[UZ_CHECK_POINTER];
         int64_t known = -1;
         if (names->n == 0)
             continue;
-        uz_check_place(where, "contacts", k / 2, k % 2 == 0 ? "on" : "with");
+        const char *where = UZ_PLACE("contacts", k / 2, k % 2 == 0 ? "on" : "with");
         for (int64_t i = 0; i < mesh->n_groups && known < 0; i++)
             known = strncmp(mesh->groups[i].name, name, sizeof mesh->groups[i].name) == 0 ? i : -1;
         if (known >= own)
