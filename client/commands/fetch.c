@@ -147,14 +147,10 @@ char *client_path_with_query(client_session *s, const char *id, const char *suff
 static client_exit fetch_and_deliver(client_session *s, char *path)
 {
     client_reply reply;
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask(s, &reply, &request);
+    client_exit code = client_get(s, &reply, path, NULL);
     if (code == CLIENT_OK)
         code = client_deliver(s, reply.body.data, reply.body.len);
     client_reply_clear(&reply);
-    free(path);
     return code;
 }
 
@@ -210,17 +206,12 @@ client_exit client_history(client_session *s)
     client_reply reply;
     const client_options *o = s->options;
     const client_query query[] = {{"case", o->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, s->options->operand, "/history", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    request.headers[0] = o->csv || o->plot ? "Accept: text/csv" : "Accept: application/json";
-    client_exit code = client_ask(s, &reply, &request);
+    client_exit code = client_get(s, &reply, client_path_with_query(s, o->operand, "/history", query),
+                                  o->csv || o->plot ? "Accept: text/csv" : "Accept: application/json");
     if (code == CLIENT_OK && o->plot)
         code = client_draw_history(s, reply.body.data ? reply.body.data : "");
     else if (code == CLIENT_OK)
         code = client_deliver(s, reply.body.data, reply.body.len);
     client_reply_clear(&reply);
-    free(path);
     return code;
 }

@@ -18,6 +18,8 @@ char *client_path_with_query(client_session *s, const char *id, const char *suff
 /* To --output or standard output, whole or not at all; with --json it says what was written. */
 client_exit client_deliver(client_session *s, const char *text, size_t len);
 
+/* Closes a stream into memory (open_memstream); false: there is not all of it, or it is NULL. */
+bool client_stream_end(FILE *to);
 /* CSV (length bytes and a NUL) as it is, or in columns for a person: numbers with five digits, "-" for none. */
 client_exit client_deliver_rows(client_session *s, const char *csv, size_t length, bool columns);
 

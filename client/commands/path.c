@@ -1,6 +1,5 @@
 /* path: displacement and stress along a line through the body, as a table for people, as CSV or as JSON. */
 #include "commands/fetch.h"
-#include <stdlib.h>
 #include <string.h>
 
 client_exit client_path(client_session *s)
@@ -13,14 +12,10 @@ client_exit client_path(client_session *s)
     const client_query query[] = {
         {"from", o->from}, {"to", o->to}, {"count", o->count < 0 ? NULL : count}, {"case", o->case_name}, {NULL, NULL}};
     char *path = client_path_with_query(s, o->operand, strcmp(format, "json") == 0 ? "/path" : "/path.csv", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    const client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask(s, &reply, &request);
+    client_exit code = client_get(s, &reply, path, NULL);
     if (code == CLIENT_OK)
         code = client_deliver_rows(s, reply.body.data ? reply.body.data : "", reply.body.len,
                                    strcmp(format, "table") == 0);
     client_reply_clear(&reply);
-    free(path);
     return code;
 }

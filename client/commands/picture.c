@@ -94,10 +94,7 @@ static client_exit fetch_picture(client_session *s, char *path)
     const bool as_png = output && strlen(output) > 4 && strcmp(output + strlen(output) - 4, ".png") == 0;
     client_reply reply;
     client_buffer png = {0};
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask(s, &reply, &request);
+    client_exit code = client_get(s, &reply, path, NULL);
     if (code == CLIENT_OK && as_png)
         code = client_picture_to_png(s, &reply.body, &png);
     const client_buffer *picture = as_png ? &png : &reply.body;
@@ -105,7 +102,6 @@ static client_exit fetch_picture(client_session *s, char *path)
         code = client_deliver(s, picture->data, picture->len);
     free(png.data);
     client_reply_clear(&reply);
-    free(path);
     return code;
 }
 

@@ -92,12 +92,10 @@ client_exit client_numbers(client_session *s, bool columns)
             put_columns(to, first, summary);
             fputc('\n', to);
         }
-        const bool whole = !ferror(to);
-        code = fclose(to) == 0 && whole ? client_deliver_rows(s, text, len, columns)
-                                        : client_complain(s, CLIENT_LOCAL, "no memory");
-    } else if (code == CLIENT_OK) {
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
     }
+    if (code == CLIENT_OK)
+        code = client_stream_end(to) ? client_deliver_rows(s, text, len, columns)
+                                     : client_complain(s, CLIENT_LOCAL, "no memory");
     free(text);
     json_decref(result);
     return code;
@@ -111,15 +109,11 @@ static client_exit save_vtu(client_session *s, const char *file, const char *cas
     char message[512];
     client_reply reply;
     const client_query query[] = {{"fields", fields}, {"case", case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, s->options->operand, "/result.vtu", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    const client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask(s, &reply, &request);
+    client_exit code =
+        client_get(s, &reply, client_path_with_query(s, s->options->operand, "/result.vtu", query), NULL);
     if (code == CLIENT_OK && !client_file_write(file, reply.body.data, reply.body.len, message, sizeof message))
         code = client_complain(s, CLIENT_LOCAL, message);
     client_reply_clear(&reply);
-    free(path);
     return code;
 }
 
@@ -150,8 +144,6 @@ client_exit client_series_of_files(client_session *s, const char *fields)
     if (code == CLIENT_OK)
         code = client_get_json(s, &result, client_job_path(s, s->options->operand, "/result?fields=summary"));
     FILE *to = code == CLIENT_OK && file ? open_memstream(&text, &len) : NULL;
-    if (code == CLIENT_OK && !to)
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
     if (to) {
         const json_t *cases = json_object_get(result, "cases");
         const bool grow = parts_grow(result, cases);
@@ -168,12 +160,10 @@ client_exit client_series_of_files(client_session *s, const char *fields)
             fputs("\"/>\n", to);
         }
         fputs("</Collection>\n</VTKFile>\n", to);
-        const bool whole = !ferror(to);
-        if ((fclose(to) != 0 || !whole) && code == CLIENT_OK)
-            code = client_complain(s, CLIENT_LOCAL, "no memory");
-        if (code == CLIENT_OK)
-            code = client_deliver(s, text, len);
     }
+    const bool whole = client_stream_end(to);
+    if (code == CLIENT_OK)
+        code = whole ? client_deliver(s, text, len) : client_complain(s, CLIENT_LOCAL, "no memory");
     free(text);
     free(file);
     json_decref(result);

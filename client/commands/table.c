@@ -236,6 +236,12 @@ static void print_columns(FILE *to, const char *csv)
     }
 }
 
+bool client_stream_end(FILE *to)
+{
+    const bool whole = to && !ferror(to);
+    return to && fclose(to) == 0 && whole;
+}
+
 client_exit client_deliver_rows(client_session *s, const char *csv, size_t length, bool columns)
 {
     char *text = NULL;
@@ -245,12 +251,8 @@ client_exit client_deliver_rows(client_session *s, const char *csv, size_t lengt
         return client_deliver(s, csv, length);
     if (to)
         print_columns(to, csv);
-    const bool whole = to && !ferror(to);
-    client_exit code;
-    if (to && fclose(to) == 0 && whole)
-        code = client_deliver(s, text, len);
-    else
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
+    const client_exit code =
+        client_stream_end(to) ? client_deliver(s, text, len) : client_complain(s, CLIENT_LOCAL, "no memory");
     free(text);
     return code;
 }
@@ -284,14 +286,10 @@ client_exit client_table(client_session *s, const char *fields, bool columns)
             print_answer(&t, json_array_get(cases, i), client_json_text(json_array_get(cases, i), "name"));
         if (!t.cases)
             print_answer(&t, result, "");
-        bool whole = !ferror(t.to);
-        if (fclose(t.to) == 0 && whole)
-            code = client_deliver_rows(s, text, len, columns);
-        else
-            code = client_complain(s, CLIENT_LOCAL, "no memory");
-    } else if (code == CLIENT_OK) {
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
     }
+    if (code == CLIENT_OK)
+        code = client_stream_end(t.to) ? client_deliver_rows(s, text, len, columns)
+                                       : client_complain(s, CLIENT_LOCAL, "no memory");
     free(text);
     json_decref(result);
     return code;

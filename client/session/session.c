@@ -70,6 +70,16 @@ client_exit client_ask(client_session *s, client_reply *reply, const client_requ
     return good ? CLIENT_OK : client_explain(s, end, reply);
 }
 
+client_exit client_get(client_session *s, client_reply *reply, char *path, const char *header)
+{
+    client_request request = client_request_new(s, "GET", path);
+    request.headers[0] = header;
+    *reply = (client_reply){0};
+    const client_exit code = path ? client_ask(s, reply, &request) : CLIENT_LOCAL;
+    free(path);
+    return code;
+}
+
 client_exit client_ask_json(client_session *s, json_t **out, const client_request *request)
 {
     client_reply reply;

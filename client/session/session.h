@@ -25,6 +25,8 @@ client_request client_request_new(const client_session *s, const char *method, c
 
 /* Sends it. Anything but a 2xx is explained on s->err and is the returned exit code. The caller clears *reply. */
 client_exit client_ask(client_session *s, client_reply *reply, const client_request *request);
+/* What is at this path, which is freed, likewise. header: one more, or NULL. path NULL: no memory, said already. */
+client_exit client_get(client_session *s, client_reply *reply, char *path, const char *header);
 /* What is said of anything else, and the exit code. An interrupt is left to the caller to tell. */
 client_exit client_explain(client_session *s, client_http_end end, const client_reply *reply);
 /* As client_ask, and the reply must be a JSON object: *out, released by the caller with json_decref, NULL on failure.
