@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/order.h"
 #include "core/vector3.h"
+#include "linalg/linalg.h"
 #include "obstacle/candidates.h"
 
 #include <math.h>
@@ -439,15 +440,14 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
 {
     const uz_mortar_surface *surface = &pair->surface;
     const int dim = pair->in->model->mesh.dim;
-    int64_t n = 0, room = 0, *start = uz_alloc_zero(n_zones + 2, sizeof *start);
-    int64_t *list = uz_alloc(surface->n, sizeof *list);
-    bool good = start && list;
-    for (int64_t i = 0; i < surface->n && good; i++)
-        start[zone[i] + 2]++;
-    for (int64_t z = 0; z < n_zones && good; z++)
-        start[z + 2] += start[z + 1];
-    for (int64_t i = 0; i < surface->n && good; i++)
-        list[start[zone[i] + 1]++] = i;
+    int64_t n = 0, room = 0;
+    uz_entries all = {.n = 0};
+    uz_csc of_zone = {0}; /* by columns: the sides of each */
+    for (int64_t i = 0; i < surface->n; i++)
+        uz_entries_add(&all, i, zone[i], 0);
+    bool good = uz_csc_from_entries(&of_zone, surface->n, n_zones, &all, NULL) == UZ_OK;
+    const int64_t *start = of_zone.ptr;
+    const int32_t *list = of_zone.idx;
     for (int64_t z = 0; z < n_zones && good; z++) {
         if (n_zones == 2 && z == 1 && n > 0)
             break; /* the other one has told */
@@ -467,8 +467,7 @@ static int64_t take_samples(sample **out, uz_mortar_pair *pair, const int64_t *z
             }
         }
     }
-    free(start);
-    free(list);
+    uz_csc_clear(&of_zone);
     return good ? n : -1;
 }
 

@@ -13,6 +13,7 @@
 
 #include "core/alloc.h"
 #include "core/vector3.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -98,9 +99,10 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
     return room;
 }
 
-/* The places about place p by rings of faces until there are enough for a quadric; returns how many. */
-static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surface, int64_t p, const int64_t *first,
-                      const int64_t *face, int64_t *seen)
+/* The places about place p by rings of faces until there are enough for a quadric; returns how many. sides: those
+ * around each place. */
+static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surface, int64_t p, const uz_csc *sides,
+                      int64_t *seen)
 {
     int n = 0, ring = 0;
     about[n++] = p;
@@ -108,9 +110,9 @@ static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surfac
     while (ring < n && n < ENOUGH_ABOUT) {
         const int end = n;
         for (; ring < end; ring++)
-            for (int64_t k = first[about[ring]]; k < first[about[ring] + 1]; k++)
-                for (int a = 0; a < surface->side[face[k]].nodes && n < MOST_ABOUT; a++) {
-                    const int64_t other = surface->side[face[k]].place[a];
+            for (int64_t k = sides->ptr[about[ring]]; k < sides->ptr[about[ring] + 1]; k++)
+                for (int a = 0; a < surface->side[sides->idx[k]].nodes && n < MOST_ABOUT; a++) {
+                    const int64_t other = surface->side[sides->idx[k]].place[a];
                     if (seen[other] == p + 1)
                         continue;
                     seen[other] = p + 1;
@@ -195,35 +197,30 @@ static bool drop_wild_patches(bool *known, const uz_mortar_surface *surface)
 static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
 {
     const int64_t n = surface->n_places;
-    int64_t entries = 0, fitted = 0;
+    int64_t fitted = 0;
+    uz_entries all = {.n = 0};
+    uz_csc sides = {0};
     for (int64_t i = 0; i < surface->n; i++) {
         uz_mortar_side *side = &surface->side[i];
         side->fitted = side->shape.kind == UZ_SMOOTH_NONE && side->nodes <= 4;
-        entries += side->nodes;
         fitted += side->fitted;
     }
     if (fitted == 0)
         return true;
-    int64_t *first = uz_alloc_zero(n + 2, sizeof *first), *face = uz_alloc(entries, sizeof *face);
     int64_t *seen = uz_alloc_zero(n, sizeof *seen);
     bool *known = uz_alloc_zero(n, sizeof *known);
     surface->patch = uz_alloc_zero(n, sizeof *surface->patch);
-    bool room = first && face && seen && known && surface->patch;
-    for (int64_t i = 0; i < surface->n && room; i++)
+    for (int64_t i = 0; i < surface->n; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
-            first[surface->side[i].place[a] + 2]++;
-    for (int64_t p = 0; p < n && room; p++)
-        first[p + 2] += first[p + 1];
-    for (int64_t i = 0; i < surface->n && room; i++)
-        for (int a = 0; a < surface->side[i].nodes; a++)
-            face[first[surface->side[i].place[a] + 1]++] = i;
+            uz_entries_add(&all, i, surface->side[i].place[a], 0);
+    bool room = uz_csc_from_entries(&sides, surface->n, n, &all, NULL) == UZ_OK && seen && known && surface->patch;
     for (int64_t p = 0; p < n && room; p++) {
         int64_t about[MOST_ABOUT];
         double xyz[3 * MOST_ABOUT];
         bool wanted = false;
-        for (int64_t k = first[p]; k < first[p + 1]; k++)
-            wanted = wanted || surface->side[face[k]].fitted;
-        const int count = wanted ? list_about(about, surface, p, first, face, seen) : 0;
+        for (int64_t k = sides.ptr[p]; k < sides.ptr[p + 1]; k++)
+            wanted = wanted || surface->side[sides.idx[k]].fitted;
+        const int count = wanted ? list_about(about, surface, p, &sides, seen) : 0;
         for (int k = 0; k < count; k++)
             memcpy(xyz + 3 * k, mesh->xyz + 3 * surface->node[about[k]], 3 * sizeof *xyz);
         known[p] = wanted && uz_smooth_patch_fit(&surface->patch[p], xyz, surface->normal + 3 * p, xyz + 3, count - 1);
@@ -235,8 +232,7 @@ static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
     for (int64_t p = 0; p < n && room; p++)
         if (known[p])
             uz_smooth_patch_height(surface->normal + 3 * p, &surface->patch[p], surface->patch[p].at);
-    free(first);
-    free(face);
+    uz_csc_clear(&sides);
     free(seen);
     free(known);
     return room;

@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 #include "obstacle/projection.h"
 
 #include <math.h>
@@ -42,8 +43,8 @@ static uz_status copy_pairs(uz_contact_sites *sites, const uz_contact_input *in,
 typedef struct {
     const uz_mortar_pair *pair;
     const uz_contact_sites *sites;
-    int64_t *first, *side; /* n_nodes + 1: the sides of both surfaces around each node */
-    int64_t *number;       /* UZ_ELEMENT_SIDES of each element: which side of the pair it is */
+    uz_csc sides;    /* by columns: the sides of both surfaces around each node */
+    int64_t *number; /* UZ_ELEMENT_SIDES of each element: which side of the pair it is */
 } own_sides;
 
 static int64_t number_of(const own_sides *own, uz_face face)
@@ -56,8 +57,8 @@ static bool is_slave(const void *ctx, int64_t node, int64_t face)
     const own_sides *own = ctx;
     const int64_t j = number_of(own, own->pair->in->with->face[face]);
     bool both = false;
-    for (int64_t q = own->first[node]; q < own->first[node + 1]; q++) {
-        const int64_t i = own->side[q];
+    for (int64_t q = own->sides.ptr[node]; q < own->sides.ptr[node + 1]; q++) {
+        const int64_t i = own->sides.idx[q];
         if (own->pair->of[i] != (UZ_OF_ON | UZ_OF_WITH))
             continue;
         both = true;
@@ -70,22 +71,14 @@ static bool is_slave(const void *ctx, int64_t node, int64_t face)
 static bool list_sides(own_sides *own, const uz_contact_input *in)
 {
     const uz_mortar_surface *surface = &own->pair->surface;
-    const int64_t n = in->model->mesh.n_nodes;
-    own->first = uz_alloc_zero(n + 2, sizeof *own->first);
-    own->side = uz_alloc(surface->n * UZ_FACE_NODES, sizeof *own->side);
+    uz_entries all = {.n = 0};
     own->number = uz_alloc(in->model->mesh.n_elements * UZ_ELEMENT_SIDES, sizeof *own->number);
-    const bool room = own->first && own->side && own->number;
-    for (int64_t i = 0; i < surface->n && room; i++) {
+    for (int64_t i = 0; i < surface->n && own->number; i++) {
         own->number[surface->side[i].face.element * UZ_ELEMENT_SIDES + surface->side[i].face.side] = i;
         for (int a = 0; a < surface->side[i].nodes; a++)
-            own->first[surface->side[i].node[a] + 2]++;
+            uz_entries_add(&all, i, surface->side[i].node[a], 0);
     }
-    for (int64_t a = 0; a < n && room; a++)
-        own->first[a + 2] += own->first[a + 1];
-    for (int64_t i = 0; i < surface->n && room; i++)
-        for (int a = 0; a < surface->side[i].nodes; a++)
-            own->side[own->first[surface->side[i].node[a] + 1]++] = i;
-    return room;
+    return uz_csc_from_entries(&own->sides, surface->n, in->model->mesh.n_nodes, &all, NULL) == UZ_OK && own->number;
 }
 
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
@@ -123,8 +116,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         }
     uz_mortar_pair_clear(&both);
     uz_own_body_free(place.own);
-    free(own.first);
-    free(own.side);
+    uz_csc_clear(&own.sides);
     free(own.number);
     free(pair);
     return status;

@@ -31,13 +31,12 @@ typedef struct {
     const uz_scene *scene;
     const double *r;
     double least, by;
-    int64_t *beside_first, *beside; /* n_nodes + 1: nodes that have a side of a contact in common with each */
-    int64_t n_pressed, *pressed;    /* rows */
-    int64_t *near_first, *near;     /* n_pressed + 1: nodes on which each of them depends */
-    int64_t *seen_first, *seen;     /* n_nodes + 1: of the pressed ones those that depend on each */
-    int64_t *color, colors;         /* n_nodes: -1: none depends on it */
-    int64_t *mark;                  /* n_nodes */
-    double *u, *way, *sum;          /* n_nodes x dim; d; d */
+    int64_t n_pressed, *pressed; /* rows */
+    /* by columns: nodes that have a side of a contact in common with each; nodes on which each pressed row depends, and
+     * by nodes which of the pressed rows do; numbers are 0 */
+    uz_csc beside, near, seen;
+    int64_t *color, colors; /* n_nodes: -1: none depends on it */
+    double *u, *way, *sum;  /* n_nodes x dim; d; d */
 } work;
 
 bool uz_has_pairs(const uz_scene *scene)
@@ -51,96 +50,59 @@ bool uz_has_pairs(const uz_scene *scene)
 /* ---- which rows depend on which nodes */
 
 /* Neighbours along the sides of contacts between bodies, each node among its own; the shortest of these sides. */
-static bool list_neighbours(work *w)
+static uz_status list_neighbours(work *w, uz_error *err)
 {
     const uz_mesh *mesh = &w->base->mesh;
     const int dim = mesh->dim;
     double shortest = INFINITY;
-    w->beside_first = uz_alloc_zero(mesh->n_nodes + 2, sizeof *w->beside_first);
-    for (int pass = 0; pass < 2 && w->beside_first; pass++) {
-        for (int64_t k = 0; k < w->scene->n_contacts; k++)
-            for (int g = 0; g < 2 && w->scene->contacts[k].kind == UZ_OBSTACLE_BODY; g++) {
-                const uz_contact *c = &w->scene->contacts[k];
-                const uz_group *group = uz_mesh_group(mesh, g == 0 ? c->on : c->with, "/contacts", NULL);
-                for (int64_t i = 0; group && i < group->n_faces; i++) {
-                    int64_t node[UZ_FACE_NODES];
-                    const int n = uz_mesh_face(node, mesh, group->face[i]);
-                    double x[2][3] = {{0}};
-                    for (int c2 = 0; c2 < 2 * dim; c2++) {
-                        const int64_t at = dim * node[c2 / dim] + c2 % dim;
-                        x[c2 / dim][c2 % dim] = mesh->xyz[at] + w->rows->place[at];
-                    }
-                    shortest = fmin(shortest, sqrt(uz_distance2(x[0], x[1], dim)));
-                    for (int a = 0; a < n; a++)
-                        for (int b = 0; b < n; b++)
-                            if (pass == 0)
-                                w->beside_first[node[a] + 2]++;
-                            else
-                                w->beside[w->beside_first[node[a] + 1]++] = node[b];
+    uz_entries all = {.n = 0};
+    for (int64_t k = 0; k < w->scene->n_contacts; k++)
+        for (int g = 0; g < 2 && w->scene->contacts[k].kind == UZ_OBSTACLE_BODY; g++) {
+            const uz_contact *c = &w->scene->contacts[k];
+            const uz_group *group = uz_mesh_group(mesh, g == 0 ? c->on : c->with, "/contacts", NULL);
+            for (int64_t i = 0; group && i < group->n_faces; i++) {
+                int64_t node[UZ_FACE_NODES];
+                const int n = uz_mesh_face(node, mesh, group->face[i]);
+                double x[2][3] = {{0}};
+                for (int c2 = 0; c2 < 2 * dim; c2++) {
+                    const int64_t at = dim * node[c2 / dim] + c2 % dim;
+                    x[c2 / dim][c2 % dim] = mesh->xyz[at] + w->rows->place[at];
                 }
+                shortest = fmin(shortest, sqrt(uz_distance2(x[0], x[1], dim)));
+                for (int a = 0; a < n; a++)
+                    for (int b = 0; b < n; b++)
+                        uz_entries_add(&all, node[b], node[a], 0);
             }
-        for (int64_t a = 0; a < mesh->n_nodes && pass == 0; a++)
-            w->beside_first[a + 2] += w->beside_first[a + 1];
-        if (pass == 0 && !(w->beside = uz_alloc(w->beside_first[mesh->n_nodes + 1], sizeof *w->beside)))
-            return false;
-    }
+        }
     w->by = MOVED_BY * shortest;
-    return w->beside_first != NULL;
+    return uz_csc_from_entries(&w->beside, mesh->n_nodes, mesh->n_nodes, &all, err);
 }
 
-/* Adds the neighbours of a node, and `more` times theirs, that the label has not marked yet. near NULL: counts. */
-static int64_t gather(work *w, int64_t *near, int64_t n, int64_t node, int more, int64_t label)
+/* Pressed row j depends on the neighbours of a node, and `more` times theirs. */
+static void gather(uz_entries *to, const work *w, int64_t node, int more, int64_t j)
 {
-    for (int64_t q = w->beside_first[node]; q < w->beside_first[node + 1]; q++) {
-        const int64_t b = w->beside[q];
-        if (w->mark[b] != label) {
-            w->mark[b] = label;
-            if (near)
-                near[n] = b;
-            n++;
-        }
+    for (int64_t q = w->beside.ptr[node]; q < w->beside.ptr[node + 1]; q++) {
+        const int64_t b = w->beside.idx[q];
+        uz_entries_add(to, b, j, 0);
         if (more > 0 && b != node)
-            n = gather(w, near, n, b, more - 1, label);
+            gather(to, w, b, more - 1, j);
     }
-    return n;
 }
 
 /* The nodes on which each pressed row depends, and the reverse. */
-static bool list_dependences(work *w)
+static uz_status list_dependences(work *w, uz_error *err)
 {
     const uz_body_model *rows = w->rows;
-    const int64_t n_nodes = rows->mesh.n_nodes;
-    int64_t label = 0;
-    w->near_first = uz_alloc_zero(w->n_pressed + 1, sizeof *w->near_first);
-    w->seen_first = uz_alloc_zero(n_nodes + 2, sizeof *w->seen_first);
-    if (!w->near_first || !w->seen_first)
-        return false;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int64_t j = 0; j < w->n_pressed; j++) {
-            const int64_t row = w->pressed[j], place = rows->row_place[row];
-            const uz_contact_sites *sites = &rows->sites[rows->info.contact_of[row]];
-            int64_t n = w->near_first[j];
-            label++;
-            n = gather(w, w->near, n, sites->at[place], 1, label);
-            for (int64_t q = sites->first[place]; q < sites->first[place + 1]; q++)
-                n = gather(w, w->near, n, sites->node[q], 0, label);
-            if (pass == 0)
-                w->near_first[j + 1] = n;
-        }
-        if (pass == 0 && !(w->near = uz_alloc(w->near_first[w->n_pressed], sizeof *w->near)))
-            return false;
+    uz_entries all = {.n = 0};
+    for (int64_t j = 0; j < w->n_pressed; j++) {
+        const int64_t row = w->pressed[j], place = rows->row_place[row];
+        const uz_contact_sites *sites = &rows->sites[rows->info.contact_of[row]];
+        gather(&all, w, sites->at[place], 1, j);
+        for (int64_t q = sites->first[place]; q < sites->first[place + 1]; q++)
+            gather(&all, w, sites->node[q], 0, j);
     }
-    const int64_t entries = w->near_first[w->n_pressed];
-    if (!(w->seen = uz_alloc(entries, sizeof *w->seen)))
-        return false;
-    for (int64_t q = 0; q < entries; q++)
-        w->seen_first[w->near[q] + 2]++;
-    for (int64_t a = 0; a < n_nodes; a++)
-        w->seen_first[a + 2] += w->seen_first[a + 1];
-    for (int64_t j = 0; j < w->n_pressed; j++)
-        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1]; q++)
-            w->seen[w->seen_first[w->near[q] + 1]++] = j;
-    return true;
+    const uz_status status = uz_csc_from_entries(&w->near, rows->mesh.n_nodes, w->n_pressed, &all, err);
+    return status == UZ_OK ? uz_csc_transpose(&w->seen, &w->near, err) : status;
 }
 
 /* Each node gets the least color that none has on which a row of its own depends, too. */
@@ -156,12 +118,12 @@ static bool color_nodes(work *w)
     for (int64_t a = 0; a < n_nodes; a++)
         w->color[a] = -1;
     for (int64_t a = 0; a < n_nodes; a++) {
-        if (w->seen_first[a] == w->seen_first[a + 1])
+        if (w->seen.ptr[a] == w->seen.ptr[a + 1])
             continue;
-        for (int64_t s = w->seen_first[a]; s < w->seen_first[a + 1]; s++)
-            for (int64_t q = w->near_first[w->seen[s]]; q < w->near_first[w->seen[s] + 1]; q++)
-                if (w->color[w->near[q]] >= 0)
-                    taken[w->color[w->near[q]]] = 1 + a;
+        for (int64_t s = w->seen.ptr[a]; s < w->seen.ptr[a + 1]; s++)
+            for (int64_t q = w->near.ptr[w->seen.idx[s]]; q < w->near.ptr[w->seen.idx[s] + 1]; q++)
+                if (w->color[w->near.idx[q]] >= 0)
+                    taken[w->color[w->near.idx[q]]] = 1 + a;
         int64_t color = 0;
         while (taken[color] == 1 + a)
             color++;
@@ -225,8 +187,8 @@ static void add_differences(uz_row_turn *out, work *w, const moved_rows side[2],
     const uz_body_model *base = w->base;
     for (int64_t j = 0; j < w->n_pressed; j++) {
         int64_t node = -1;
-        for (int64_t q = w->near_first[j]; q < w->near_first[j + 1] && node < 0; q++)
-            node = w->color[w->near[q]] == color ? w->near[q] : -1;
+        for (int64_t q = w->near.ptr[j]; q < w->near.ptr[j + 1] && node < 0; q++)
+            node = w->color[w->near.idx[q]] == color ? w->near.idx[q] : -1;
         if (node < 0 || !is_moved(base, node, c))
             continue;
         if (side[0].at[j] < 0 || side[1].at[j] < 0) {
@@ -354,18 +316,21 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
         return uz_row_turn_in_space(out, base, rows, scene, r, least, err);
     bool room = list_pressed(&w);
     if (room && w.n_pressed > 0) {
-        w.mark = uz_alloc_zero(base->mesh.n_nodes, sizeof *w.mark);
         w.u = uz_alloc(dim * base->mesh.n_nodes, sizeof *w.u);
         w.way = uz_alloc(base->d, sizeof *w.way);
         w.sum = uz_alloc_zero(base->d, sizeof *w.sum);
-        room = w.mark && w.u && w.way && w.sum && list_neighbours(&w) && list_dependences(&w) && color_nodes(&w);
+        room = w.u && w.way && w.sum;
         for (int s = 0; s < 2; s++) {
             side[s].at = uz_alloc(w.n_pressed, sizeof *side[s].at);
             side[s].gap = uz_alloc(w.n_pressed, sizeof *side[s].gap);
             room = room && side[s].at && side[s].gap;
         }
+        status = list_neighbours(&w, err);
+        if (status == UZ_OK)
+            status = list_dependences(&w, err);
+        room = room && (status != UZ_OK || color_nodes(&w));
     }
-    if (!room)
+    if (status == UZ_OK && !room)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how %lld contact rows turn", (long long)rows->m);
     for (int64_t color = 0; color < w.colors && status == UZ_OK && out->known; color++)
         for (int c = 0; c < dim && status == UZ_OK && out->known; c++) {
@@ -379,15 +344,11 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for how contact rows turn");
     if (!out->known)
         out->force.n = out->gap.n = 0;
-    free(w.beside_first);
-    free(w.beside);
+    uz_csc_clear(&w.beside);
+    uz_csc_clear(&w.near);
+    uz_csc_clear(&w.seen);
     free(w.pressed);
-    free(w.near_first);
-    free(w.near);
-    free(w.seen_first);
-    free(w.seen);
     free(w.color);
-    free(w.mark);
     free(w.u);
     free(w.way);
     free(w.sum);

@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "linalg/linalg.h"
 #include "obstacle/box_tree.h"
 #include "obstacle/face_point.h"
 #include "scene/check.h"
@@ -27,15 +28,13 @@ typedef struct uz_faces {
     const uz_group *group;
     double scale;
     uz_box_tree tree;
-    int64_t *first; /* n_nodes + 1: faces with node i for a corner are around[first[i]..first[i + 1]) */
-    int64_t *around;
+    uz_csc around; /* by columns: the faces that have each node for a corner */
 } master;
 
 static void master_clear(master *m)
 {
     uz_box_tree_clear(&m->tree);
-    free(m->first);
-    free(m->around);
+    uz_csc_clear(&m->around);
 }
 
 /* The face's nodes as seen from x, scaled; returns how many. */
@@ -176,8 +175,8 @@ static int corner_of(const master *m, int64_t face, int64_t node)
 static int64_t faces_with_edge(const master *m, int64_t a, int64_t b)
 {
     int64_t count = 0;
-    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++)
-        count += corner_of(m, m->around[q], b) >= 0;
+    for (int64_t q = m->around.ptr[a]; q < m->around.ptr[a + 1]; q++)
+        count += corner_of(m, m->around.idx[q], b) >= 0;
     return count;
 }
 
@@ -185,11 +184,11 @@ static int64_t faces_with_edge(const master *m, int64_t a, int64_t b)
 static bool ends_at(const master *m, int64_t node)
 {
     if (m->mesh->dim == 2)
-        return m->first[node + 1] - m->first[node] < 2;
-    for (int64_t q = m->first[node]; q < m->first[node + 1]; q++) {
+        return m->around.ptr[node + 1] - m->around.ptr[node] < 2;
+    for (int64_t q = m->around.ptr[node]; q < m->around.ptr[node + 1]; q++) {
         int64_t of[UZ_FACE_NODES];
-        const int corners = uz_face_corners(3, uz_mesh_face(of, m->mesh, m->group->face[m->around[q]]));
-        const int at = corner_of(m, m->around[q], node);
+        const int corners = uz_face_corners(3, uz_mesh_face(of, m->mesh, m->group->face[m->around.idx[q]]));
+        const int at = corner_of(m, m->around.idx[q], node);
         if (faces_with_edge(m, node, of[(at + 1) % corners]) < 2)
             return true;
         if (faces_with_edge(m, node, of[(at + corners - 1) % corners]) < 2)
@@ -233,9 +232,9 @@ static bool normal_between(double normal[3], const master *m, const uz_contact_p
     for (int c = 0; c < dim; c++)
         place[c] = x[c] + foot->point[c];
     /* the mean of the faces around corner a, or of those that have the edge a, b (b >= 0) */
-    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++) {
+    for (int64_t q = m->around.ptr[a]; q < m->around.ptr[a + 1]; q++) {
         uz_foot there;
-        const int64_t face = m->around[q];
+        const int64_t face = m->around.idx[q];
         if (b >= 0 && corner_of(m, face, b) < 0)
             continue;
         closest_on(&there, m, face, place);
@@ -318,11 +317,13 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
     at.node = &node;
     at.nodes = 1;
     at.normal = (const double(*)[3])normal;
-    for (int64_t q = slave->first[node]; own->own && q < slave->first[node + 1] && at.normals < MOST_AROUND; q++) {
+    const int64_t first = slave->around.ptr[node], end = slave->around.ptr[node + 1];
+    const int32_t *around = slave->around.idx;
+    for (int64_t q = first; own->own && q < end && at.normals < MOST_AROUND; q++) {
         uz_foot foot;
-        closest_on(&foot, slave, slave->around[q], x);
+        closest_on(&foot, slave, around[q], x);
         memcpy(normal[at.normals++], foot.normal, sizeof foot.normal);
-        at.element = slave->group->face[slave->around[q]].element;
+        at.element = slave->group->face[around[q]].element;
     }
     if (!place_on(found, row, m, x, own->own ? &at : NULL)) {
         return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", index, "with"),
@@ -332,10 +333,10 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
     row->node = node;
     /* Where all faces of the slave around its node look the way the master does, what is behind the master there is
      * the far side of the slave, as of a clamp around a plate, and did not come through it. */
-    bool away = *found && row->gap < -ON_BORDER * row->size && slave->first[node + 1] > slave->first[node];
-    for (int64_t q = slave->first[node]; q < slave->first[node + 1] && away; q++) {
+    bool away = *found && row->gap < -ON_BORDER * row->size && end > first;
+    for (int64_t q = first; q < end && away; q++) {
         uz_foot foot;
-        closest_on(&foot, slave, slave->around[q], x);
+        closest_on(&foot, slave, around[q], x);
         away = uz_dot3(foot.normal, row->normal) > SAME_WAY;
     }
     *found = *found && !away;
@@ -396,24 +397,15 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
         status = box ? uz_box_tree_init(&m->tree, group->n_faces, mesh->dim, box, err) : uz_no_memory(err, OF_BODIES);
         free(box);
     }
-    m->first = uz_alloc_zero(mesh->n_nodes + 1, sizeof *m->first);
-    m->around = uz_alloc(group->n_faces, UZ_FACE_NODES * sizeof *m->around);
-    if (status == UZ_OK && (!m->first || !m->around))
-        status = uz_no_memory(err, OF_BODIES);
-    /* counted, summed, placed: filling from the end leaves first[i] at the beginning of its list */
-    for (int pass = 0; pass < 2 && status == UZ_OK; pass++) {
-        for (int64_t f = group->n_faces - 1; f >= 0; f--) {
-            const int all = uz_mesh_face(node, mesh, group->face[f]);
-            const int count = middles ? all : uz_face_corners(mesh->dim, all);
-            for (int i = 0; i < count; i++)
-                if (pass == 0)
-                    m->first[node[i]]++;
-                else
-                    m->around[--m->first[node[i]]] = f;
-        }
-        for (int64_t i = 0; i < mesh->n_nodes && pass == 0; i++)
-            m->first[i + 1] += m->first[i];
+    uz_entries all = {.n = 0};
+    for (int64_t f = 0; f < group->n_faces; f++) {
+        const int nodes = uz_mesh_face(node, mesh, group->face[f]);
+        for (int i = 0; i < (middles ? nodes : uz_face_corners(mesh->dim, nodes)); i++)
+            uz_entries_add(&all, f, node[i], 0);
     }
+    if (status == UZ_OK)
+        status = uz_csc_from_entries(&m->around, group->n_faces, mesh->n_nodes, &all, err);
+    uz_entries_clear(&all);
     return status;
 }
 

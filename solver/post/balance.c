@@ -9,6 +9,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "linalg/linalg.h"
 #include "post/parts.h"
 
 #include <math.h>
@@ -25,7 +26,7 @@ typedef struct {
     int dim;
     double *load, *contact, *inner; /* n_nodes x dim; inner: f_int where it is wanted */
     bool *held, *wanted;            /* n_nodes; wanted: held, or other nodes bear what acts there */
-    int64_t *first, *support;       /* supports of each node: support[first[a]..first[a + 1]) */
+    uz_csc supports;                /* by columns: which of them hold each node */
     double centre[DIM];
     double force[DIM], moment[DIM]; /* of everything, the moment about the centre: the first node */
     double size;
@@ -120,30 +121,21 @@ static uz_status add_springs(balance *b, uz_error *err)
     return status;
 }
 
-/* Which supports hold each node, in the scene's order. False: no memory. */
-static bool list_supports(balance *b)
+/* Which supports hold each node, in the scene's order. */
+static uz_status list_supports(balance *b, uz_error *err)
 {
     const uz_mesh *mesh = &b->model->mesh;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int64_t s = 0; s < b->scene->n_supports; s++) {
-            const uz_support *support = &b->scene->supports[s];
-            const uz_group *group =
-                support->kind == UZ_SUPPORT_SPRING ? NULL : uz_mesh_group(mesh, support->on, "", NULL);
-            for (int64_t i = 0; group && i < uz_group_node_count(mesh, group); i++) {
-                const int64_t a = uz_group_node_at(group, i);
-                if (pass == 0)
-                    b->first[a + 2]++;
-                else
-                    b->support[b->first[a + 1]++] = s;
-                b->held[a] = true;
-            }
+    uz_entries all = {.n = 0};
+    for (int64_t s = 0; s < b->scene->n_supports; s++) {
+        const uz_support *support = &b->scene->supports[s];
+        const uz_group *group = support->kind == UZ_SUPPORT_SPRING ? NULL : uz_mesh_group(mesh, support->on, "", NULL);
+        for (int64_t i = 0; group && i < uz_group_node_count(mesh, group); i++) {
+            const int64_t a = uz_group_node_at(group, i);
+            uz_entries_add(&all, s, a, 0);
+            b->held[a] = true;
         }
-        for (int64_t a = 0; pass == 0 && a < mesh->n_nodes; a++)
-            b->first[a + 2] += b->first[a + 1];
-        if (pass == 0 && !(b->support = uz_alloc(b->first[mesh->n_nodes + 1], sizeof *b->support)))
-            return false;
     }
-    return true;
+    return uz_csc_from_entries(&b->supports, b->scene->n_supports, mesh->n_nodes, &all, err);
 }
 
 static void find_wanted(balance *b)
@@ -275,18 +267,19 @@ static void add_reaction(balance *b, int64_t node)
     const uz_rigid_group *rigid = uz_rigid_group_of(b->model, node);
     if (rigid)
         add_force(b, &b->out->supports[rigid->support], node, R);
-    for (int64_t i = b->first[node]; i < b->first[node + 1] && !rigid; i++) {
-        const uz_support *support = &b->scene->supports[b->support[i]];
+    for (int64_t i = b->supports.ptr[node]; i < b->supports.ptr[node + 1] && !rigid; i++) {
+        const int64_t s = b->supports.idx[i];
+        const uz_support *support = &b->scene->supports[s];
         double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
         if (uz_support_is_inclined(n, support, b->dim)) {
-            hold(&h, b->support[i], n);
+            hold(&h, s, n);
             continue;
         }
         uz_support_values(u, support, b->dim);
         for (int c = 0; c < b->dim; c++) {
             const double axis[DIM] = {c == 0, c == 1, c == 2};
             if (!isnan(u[c]))
-                hold(&h, b->support[i], axis);
+                hold(&h, s, axis);
         }
     }
     for (int i = h.n - 1; i >= 0; i--) {
@@ -394,8 +387,7 @@ static bool make_room(balance *b, int64_t n)
     b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
     b->held = uz_alloc_zero(n, sizeof *b->held);
     b->wanted = uz_alloc(n, sizeof *b->wanted);
-    b->first = uz_alloc_zero(n + 2, sizeof *b->first);
-    return b->load && b->contact && b->inner && b->held && b->wanted && b->first;
+    return b->load && b->contact && b->inner && b->held && b->wanted;
 }
 
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
@@ -439,8 +431,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         if (f[0] != 0 || f[1] != 0 || (dim == 3 && f[2] != 0))
             add_force(&b, &out->loads, a, f);
     }
-    if (status == UZ_OK && !list_supports(&b))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    if (status == UZ_OK)
+        status = list_supports(&b, err);
     if (status == UZ_OK)
         find_wanted(&b);
     if (status == UZ_OK && known)
@@ -474,7 +466,6 @@ done:
     free(b.inner);
     free(b.held);
     free(b.wanted);
-    free(b.first);
-    free(b.support);
+    uz_csc_clear(&b.supports);
     return status;
 }

@@ -125,6 +125,6 @@ TEST(every_allocation_may_fail)
     CHECK_INT(fail_each(make_along), 12);
     CHECK_INT(fail_each(make_table), 8);
     CHECK(fail_each(make_surface) > 15);
-    CHECK_INT(fail_each(make_pairs), 9);
+    CHECK_INT(fail_each(make_pairs), 16);
     CHECK_INT(fail_each(choose), 5);
 }
