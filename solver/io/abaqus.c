@@ -78,9 +78,8 @@ uz_status abaqus_fail_no_body(const abaqus_file *file, int64_t element)
 {
     const int number = file->type[element];
     const abaqus_family *family = abaqus_type_of(number).family;
-    abaqus_text place = file->text;
-    place.number = file->line[element];
-    return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "element %lld, of type %s, is %s, which is not modelled; %s",
+    return abaqus_fail(ABAQUS_LINE(&file->text, file->line[element]), UZ_ERR_UNSUPPORTED,
+                       "element %lld, of type %s, is %s, which is not modelled; %s",
                        (long long)file->elements.tag[element], SIDE_TYPES[number - ABAQUS_SIDES].name, family->what,
                        family->remedy);
 }
@@ -309,21 +308,20 @@ static uz_status read_other(abaqus_file *file, const abaqus_keyword *keyword)
         {"ELGEN", "list the elements"},
         {"ELCOPY", "list the elements"},
     };
-    abaqus_text place = file->text;
+    const abaqus_text *place = ABAQUS_LINE(&file->text, keyword->line);
     int64_t lines;
-    place.number = keyword->line;
     for (size_t i = 0; i < sizeof REFUSED / sizeof REFUSED[0]; i++)
         if (abaqus_keyword_is(keyword, REFUSED[i].name))
-            return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "*%s is not read; %s", REFUSED[i].name, REFUSED[i].remedy);
+            return abaqus_fail(place, UZ_ERR_UNSUPPORTED, "*%s is not read; %s", REFUSED[i].name, REFUSED[i].remedy);
     file->n_parts += abaqus_keyword_is(keyword, "PART");
     file->n_instances += abaqus_keyword_is(keyword, "INSTANCE");
     if (file->n_parts > 1 || file->n_instances > 1)
-        return abaqus_fail(&place, UZ_ERR_UNSUPPORTED,
+        return abaqus_fail(place, UZ_ERR_UNSUPPORTED,
                            "there is a second part or instance, whose numbers are its own; write the model without "
                            "parts and assemblies");
     skip_data(&file->text, &lines);
     if (abaqus_keyword_is(keyword, "INSTANCE") && lines > 0)
-        return abaqus_fail(&place, UZ_ERR_UNSUPPORTED,
+        return abaqus_fail(place, UZ_ERR_UNSUPPORTED,
                            "an instance that is moved is not read; write the model without parts and assemblies");
     return UZ_OK;
 }
@@ -380,14 +378,12 @@ static uz_status choose_dim(int *dim, const abaqus_file *file)
 
 static uz_status check_nodes(const abaqus_file *file)
 {
-    abaqus_text place = file->text;
     for (int64_t e = 0; e < file->elements.count; e++)
         for (int64_t q = file->first[e]; q < file->first[e + 1]; q++)
-            if (abaqus_tags_find(&file->nodes, file->node[q]) < 0) {
-                place.number = file->line[e];
-                return abaqus_fail(&place, UZ_ERR_FORMAT, "element %lld has node %lld, which is not there",
-                                   (long long)file->elements.tag[e], (long long)file->node[q]);
-            }
+            if (abaqus_tags_find(&file->nodes, file->node[q]) < 0)
+                return abaqus_fail(ABAQUS_LINE(&file->text, file->line[e]), UZ_ERR_FORMAT,
+                                   "element %lld has node %lld, which is not there", (long long)file->elements.tag[e],
+                                   (long long)file->node[q]);
     return UZ_OK;
 }
 

@@ -22,6 +22,8 @@ typedef struct {
 
 uz_status abaqus_fail(const abaqus_text *text, uz_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* Another line of the same text, for abaqus_fail. */
+#define ABAQUS_LINE(text, line) (&(abaqus_text){.number = (line), .err = (text)->err})
 /* Moves to the next line that is neither blank nor a comment; false, and an empty line: there is none. */
 bool abaqus_next_line(abaqus_text *text);
 static inline bool abaqus_is_keyword(const abaqus_text *text)

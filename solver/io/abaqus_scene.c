@@ -226,18 +226,23 @@ static uz_status drop_nodes(abaqus_deck *d)
 
 /* ---- what the scene says */
 
+/* Room for one more in a list of the scene, which has count of them. */
+static uz_status one_more(abaqus_deck *d, void *list, int64_t count, size_t size, const char *what)
+{
+    int64_t room = count;
+    if (count == LIST_MOST)
+        return too_many(d, what);
+    return uz_grow(list, count, 1, &room, size) ? UZ_OK : abaqus_no_memory(&d->text);
+}
+
 static uz_status add_support(abaqus_deck *d, uz_support support, const char *group)
 {
     uz_scene *scene = &d->out->scene;
-    if (scene->n_supports == LIST_MOST)
-        return too_many(d, "supports");
-    uz_support *to = uz_realloc(scene->supports, scene->n_supports + 1, sizeof *to);
-    if (!to)
-        return abaqus_no_memory(&d->text);
-    scene->supports = to;
+    const uz_status status = one_more(d, &scene->supports, scene->n_supports, sizeof support, "supports");
     snprintf(support.on, sizeof support.on, "%.63s", group);
-    to[scene->n_supports++] = support;
-    return UZ_OK;
+    if (status == UZ_OK)
+        scene->supports[scene->n_supports++] = support;
+    return status;
 }
 
 static uz_status add_held(abaqus_deck *d, const char *group, const double key[3], int64_t count)
@@ -250,15 +255,11 @@ static uz_status add_held(abaqus_deck *d, const char *group, const double key[3]
 static uz_status add_load(abaqus_deck *d, uz_load load, const char *group)
 {
     uz_scene *scene = &d->out->scene;
-    if (scene->n_loads == LIST_MOST)
-        return too_many(d, "loads");
-    uz_load *to = uz_realloc(scene->loads, scene->n_loads + 1, sizeof *to);
-    if (!to)
-        return abaqus_no_memory(&d->text);
-    scene->loads = to;
+    const uz_status status = one_more(d, &scene->loads, scene->n_loads, sizeof load, "loads");
     snprintf(load.on, sizeof load.on, "%.63s", group);
-    to[scene->n_loads++] = load;
-    return UZ_OK;
+    if (status == UZ_OK)
+        scene->loads[scene->n_loads++] = load;
+    return status;
 }
 
 static uz_status add_force(abaqus_deck *d, const char *group, const double key[3], int64_t count)
@@ -329,11 +330,9 @@ static uz_status make_rigid(abaqus_deck *d, const deck_rigid *rigid)
     for (int c = 0; c < mesh->dim && rigid->point >= 0; c++)
         support.about[c] = mesh->xyz[mesh->dim * rigid->point + c];
     for (int c = 0; c < 3; c++) {
-        if (ring && c != 1 && (motion[c] < 0 || motion[c] > 0 || motion[3 + c] < 0 || motion[3 + c] > 0)) {
-            abaqus_text place = d->text;
-            place.number = rigid->line;
-            return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "a rigid body of revolution moves along its axis only");
-        }
+        if (ring && c != 1 && (motion[c] < 0 || motion[c] > 0 || motion[3 + c] < 0 || motion[3 + c] > 0))
+            return abaqus_fail(ABAQUS_LINE(&d->text, rigid->line), UZ_ERR_UNSUPPORTED,
+                               "a rigid body of revolution moves along its axis only");
         support.u[c] = ring && c != 1 ? (double)NAN : motion[c];
         support.turn[c] = ring ? (double)NAN : motion[3 + c];
         load.point[c] = support.about[c];
@@ -360,18 +359,13 @@ static uz_status add_material(abaqus_deck *d, const char *group, const double ke
     uz_scene *scene = &d->out->scene;
     const deck_material *from = &d->materials[(int64_t)key[0] - 1];
     (void)count;
-    if (scene->n_materials == LIST_MOST)
-        return too_many(d, "materials");
-    if (!from->elastic) {
-        abaqus_text place = d->text;
-        place.number = from->line;
-        return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "the material \"%.60s\" has no *ELASTIC", from->name);
-    }
-    uz_material *to = uz_realloc(scene->materials, scene->n_materials + 1, sizeof *to);
-    if (!to)
-        return abaqus_no_memory(&d->text);
-    scene->materials = to;
-    to += scene->n_materials++;
+    if (!from->elastic)
+        return abaqus_fail(ABAQUS_LINE(&d->text, from->line), UZ_ERR_UNSUPPORTED,
+                           "the material \"%.60s\" has no *ELASTIC", from->name);
+    const uz_status status = one_more(d, &scene->materials, scene->n_materials, sizeof *scene->materials, "materials");
+    if (status != UZ_OK)
+        return status;
+    uz_material *to = &scene->materials[scene->n_materials++];
     *to = (uz_material){.law = UZ_ELASTIC_LINEAR,
                         .young = from->young,
                         .poisson = from->poisson,
@@ -389,12 +383,10 @@ static uz_status make_materials(abaqus_deck *d)
     for (int64_t e = 0; e < n && status == UZ_OK; e++)
         key[e] = (double)(d->material[e] + 1);
     for (int64_t f = 0; f < d->file->elements.count && status == UZ_OK; f++)
-        if (d->new_element[f] >= 0 && d->material[d->new_element[f]] < 0) {
-            abaqus_text place = d->text;
-            place.number = d->file->line[f];
-            status = abaqus_fail(&place, UZ_ERR_FORMAT, "element %lld is in no *SOLID SECTION, and has no material",
+        if (d->new_element[f] >= 0 && d->material[d->new_element[f]] < 0)
+            status = abaqus_fail(ABAQUS_LINE(&d->text, d->file->line[f]), UZ_ERR_FORMAT,
+                                 "element %lld is in no *SOLID SECTION, and has no material",
                                  (long long)d->file->elements.tag[f]);
-        }
     if (status == UZ_OK)
         status = for_alike(d, key, 1, false, "section", add_material);
     free(key);
@@ -512,11 +504,10 @@ static uz_status make_pressures(abaqus_deck *d)
         const deck_pressure *from = &d->pressures[i];
         if (from->element < 0) {
             const uz_given_group *group = find_group(d->mesh, from->surface);
-            abaqus_text place = d->text;
-            place.number = from->line;
             status = group && group->n_faces > 0
                          ? add_load(d, (uz_load){.kind = UZ_LOAD_PRESSURE, .value = from->value}, group->name)
-                         : abaqus_fail(&place, UZ_ERR_FORMAT, "there is no surface of sides \"%.60s\"", from->surface);
+                         : abaqus_fail(ABAQUS_LINE(&d->text, from->line), UZ_ERR_FORMAT,
+                                       "there is no surface of sides \"%.60s\"", from->surface);
         } else {
             list[n] = side_of_file(d, from->element, from->face);
             list[n++].value = from->value;
@@ -616,9 +607,7 @@ static uz_status sides_of_nodes(char name[64], abaqus_deck *d, int64_t line, con
 /* The group of sides of a surface; name "": it is made of single nodes. */
 static uz_status surface_of(char name[64], abaqus_deck *d, int64_t line, const char *surface)
 {
-    abaqus_text place = d->text;
     char nodes[80];
-    place.number = line;
     const uz_given_group *group = find_group(d->mesh, surface);
     name[0] = '\0';
     if (group && group->n_faces > 0) {
@@ -629,7 +618,7 @@ static uz_status surface_of(char name[64], abaqus_deck *d, int64_t line, const c
     if (!group || group->n_nodes == 0)
         group = find_group(d->mesh, nodes);
     if (!group || group->n_nodes == 0)
-        return abaqus_fail(&place, UZ_ERR_FORMAT, "there is no surface \"%.60s\"", surface);
+        return abaqus_fail(ABAQUS_LINE(&d->text, line), UZ_ERR_FORMAT, "there is no surface \"%.60s\"", surface);
     const uz_given_group copy = *group; /* of a list that grows */
     return sides_of_nodes(name, d, line, &copy);
 }
@@ -784,10 +773,9 @@ static uz_status refuse_left_out(const abaqus_deck *d)
             snprintf(list + used, sizeof list - used, "; line %lld: %s", (long long)note->line, note->keyword);
         }
     }
-    abaqus_text place = d->text;
-    place.number = first;
     return count == 0 ? UZ_OK
-                      : abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "%s%s. Allow leaving it out, or change the deck", list,
+                      : abaqus_fail(ABAQUS_LINE(&d->text, first), UZ_ERR_UNSUPPORTED,
+                                    "%s%s. Allow leaving it out, or change the deck", list,
                                     count > 1 ? " (and the answer would be another one with each of these)" : "");
 }
 

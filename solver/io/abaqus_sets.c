@@ -201,9 +201,7 @@ typedef struct {
 static uz_status fail_at(const set_work *w, int64_t line, uz_status status, const char *format, const char *name,
                          int64_t number)
 {
-    abaqus_text place = w->file->text;
-    place.number = line;
-    return abaqus_fail(&place, status, format, name, (long long)number);
+    return abaqus_fail(ABAQUS_LINE(&w->file->text, line), status, format, name, (long long)number);
 }
 
 static uz_status take(set_work *w, int64_t set, int64_t index, int face)

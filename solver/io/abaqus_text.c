@@ -129,20 +129,19 @@ const char *abaqus_parameter(const abaqus_keyword *keyword, const char *name)
 uz_status abaqus_name(char out[ABAQUS_NAME], const abaqus_keyword *keyword, const char *parameter, bool needed,
                       const abaqus_text *text)
 {
-    abaqus_text place = *text;
+    const abaqus_text *place = ABAQUS_LINE(text, keyword->line);
     const char *value = abaqus_parameter(keyword, parameter);
-    place.number = keyword->line;
     out[0] = '\0';
     if (!value && !needed)
         return UZ_OK;
     const size_t length = value ? strlen(value) : 0;
     if (length == 0 || length >= ABAQUS_NAME)
-        return abaqus_fail(&place, UZ_ERR_FORMAT, "*%.40s has no %s, or one of more than %d bytes", keyword->text,
+        return abaqus_fail(place, UZ_ERR_FORMAT, "*%.40s has no %s, or one of more than %d bytes", keyword->text,
                            parameter, ABAQUS_NAME - 1);
     for (size_t i = 0, step; i < length; i += step) {
         step = uz_utf8_length(value + i, length - i);
         if (step == 0 || uz_utf8_unsafe(value + i, length - i))
-            return abaqus_fail(&place, UZ_ERR_UNSUPPORTED, "a name has a control character or is not UTF-8");
+            return abaqus_fail(place, UZ_ERR_UNSUPPORTED, "a name has a control character or is not UTF-8");
     }
     memcpy(out, value, length + 1);
     return UZ_OK;
