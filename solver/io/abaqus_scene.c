@@ -453,16 +453,10 @@ static uz_status group_of_sides(char name[64], abaqus_deck *d, const char *what,
         return d->mesh->n_groups < UZ_MESH_MAX_GROUPS
                    ? abaqus_no_memory(&d->text)
                    : abaqus_fail(&d->text, UZ_ERR_UNSUPPORTED, "there are more than %d groups", UZ_MESH_MAX_GROUPS);
-    to->face_first = uz_alloc(n + 1, sizeof *to->face_first);
-    to->face_node = uz_alloc(4 * n, sizeof *to->face_node);
-    if (!to->face_first || !to->face_node)
-        return abaqus_no_memory(&d->text);
-    to->face_first[0] = 0;
-    for (int64_t i = 0, used = 0; i < n; i++) {
-        for (int k = 0; k < list[i].count; k++)
-            to->face_node[used++] = list[i].node[k];
-        to->face_first[++to->n_faces] = used;
-    }
+    uz_given_members members = {.to = to};
+    for (int64_t i = 0; i < n; i++)
+        if (!uz_given_add(&members, UZ_GIVEN_SIDE, -1, list[i].node, list[i].count))
+            return abaqus_no_memory(&d->text);
     memcpy(name, to->name, sizeof to->name);
     return UZ_OK;
 }

@@ -300,24 +300,13 @@ const char *abaqus_side(uz_element_kind kind, int face)
     return face < 1 || face > 6 ? NULL : SIDES[row][face - 1];
 }
 
-static bool make_faces(uz_given_group *to, int64_t faces, int64_t nodes)
-{
-    to->face_first = uz_alloc(faces + 1, sizeof *to->face_first);
-    to->face_node = uz_alloc(nodes, sizeof *to->face_node);
-    if (!to->face_first || !to->face_node)
-        return false;
-    to->face_first[0] = 0;
-    return true;
-}
-
 /* The sides of a surface; sides of elements that are no part of the body are refused. */
 static uz_status add_surface(uz_given_group *to, const set_work *w, int64_t set)
 {
     const abaqus_file *file = w->file;
     const abaqus_members *list = &w->list[set];
-    if (!make_faces(to, list->count, 4 * list->count))
-        return abaqus_no_memory(&file->text);
-    for (int64_t i = 0, used = 0; i < list->count; i++) {
+    uz_given_members members = {.to = to};
+    for (int64_t i = 0; i < list->count; i++) {
         const int64_t e = list->index[i];
         if (w->new_element[e] < 0)
             return abaqus_type_of(file->type[e]).family
@@ -330,47 +319,30 @@ static uz_status add_surface(uz_given_group *to, const set_work *w, int64_t set)
             return fail_at(w, file->line[e], UZ_ERR_UNSUPPORTED,
                            "the surface \"%s\" has a side, S%lld, that this element has not", file->sets[set].name,
                            list->face[i]);
+        int64_t node[4], n = 0;
         for (; *corner; corner++)
-            to->face_node[used++] = abaqus_tags_find(&file->nodes, file->node[file->first[e] + (*corner - '1')]);
-        to->face_first[++to->n_faces] = used;
+            node[n++] = abaqus_tags_find(&file->nodes, file->node[file->first[e] + (*corner - '1')]);
+        if (!uz_given_add(&members, UZ_GIVEN_SIDE, -1, node, n))
+            return abaqus_no_memory(&file->text);
     }
     return UZ_OK;
 }
 
 /* What of a set of elements is of the dimension of the body (elements), of one less (sides), or still less (nodes). */
-static uz_status add_elements(uz_given_group *to, const set_work *w, int64_t set, int drop)
+static uz_status add_elements(uz_given_group *to, const set_work *w, int64_t set, uz_given_way way)
 {
     const abaqus_file *file = w->file;
     const abaqus_members *list = &w->list[set];
-    int64_t count = 0, nodes = 0;
-    for (int64_t i = 0; i < list->count; i++)
-        if (w->out->dim - abaqus_type_of(file->type[list->index[i]]).dim == drop) {
-            count++;
-            nodes += file->first[list->index[i] + 1] - file->first[list->index[i]];
-        }
-    if (count == 0)
-        return UZ_OK;
-    if (drop == 0   ? !(to->element = uz_alloc(count, sizeof *to->element))
-        : drop == 1 ? !make_faces(to, count, nodes)
-                    : !(to->node = uz_alloc(nodes, sizeof *to->node)))
-        return abaqus_no_memory(&file->text);
+    uz_given_members members = {.to = to};
     for (int64_t i = 0; i < list->count; i++) {
-        const int64_t e = list->index[i];
-        const int below = w->out->dim - abaqus_type_of(file->type[e]).dim;
-        if (below != drop)
+        const int64_t e = list->index[i], from = file->first[e], n = file->first[e + 1] - from;
+        int64_t node[UZ_ELEMENT_NODES];
+        if (w->out->dim - abaqus_type_of(file->type[e]).dim != (int)way)
             continue;
-        if (drop == 0) {
-            to->element[to->n_elements++] = w->new_element[e];
-            continue;
-        }
-        int64_t used = drop == 1 ? to->face_first[to->n_faces] : to->n_nodes;
-        int64_t *node = drop == 1 ? to->face_node : to->node;
-        for (int64_t q = file->first[e]; q < file->first[e + 1]; q++)
-            node[used++] = abaqus_tags_find(&file->nodes, file->node[q]);
-        if (drop == 1)
-            to->face_first[++to->n_faces] = used;
-        else
-            to->n_nodes = used;
+        for (int64_t q = 0; q < n; q++)
+            node[q] = abaqus_tags_find(&file->nodes, file->node[from + q]);
+        if (!uz_given_add(&members, way, w->new_element[e], node, n))
+            return abaqus_no_memory(&file->text);
     }
     return UZ_OK;
 }
@@ -451,11 +423,11 @@ static uz_status add_groups(set_work *w, int64_t s)
                               "\"%s\" is the name of a surface and of a set of sides; give one another name", name, 0);
         }
         if (file->sets[k].kind == ABAQUS_ELSET) {
-            status = add_elements(&made[BY_ELEMENTS], w, k, 0);
+            status = add_elements(&made[BY_ELEMENTS], w, k, UZ_GIVEN_ELEMENT);
             if (status == UZ_OK && made[BY_SIDES].n_faces == 0)
-                status = add_elements(&made[BY_SIDES], w, k, 1);
+                status = add_elements(&made[BY_SIDES], w, k, UZ_GIVEN_SIDE);
             if (status == UZ_OK && made[BY_NODES].n_nodes == 0)
-                status = add_elements(&made[BY_NODES], w, k, 2);
+                status = add_elements(&made[BY_NODES], w, k, UZ_GIVEN_NODES);
         }
         if (file->sets[k].kind == ABAQUS_NSET && w->list[k].count > 0) {
             free(made[BY_NODES].node);

@@ -187,57 +187,27 @@ static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_ce
 
 /* ---- groups */
 
-enum { BY_ELEMENTS, BY_SIDES, BY_NODES, WAYS };
-
 /* How a member of a set belongs to a group. */
-static int way_of(const cells *mesh, const cells_set *set, int64_t i, int dim)
+static uz_given_way way_of(const cells *mesh, const cells_set *set, int64_t i, int dim)
 {
     const int its_dim = set->nodes ? 0 : dim_of(mesh->shape[set->index[i]]);
-    return set->nodes || its_dim < dim - 1 ? BY_NODES : its_dim == dim ? BY_ELEMENTS : BY_SIDES;
+    return set->nodes || its_dim < dim - 1 ? UZ_GIVEN_NODES : its_dim == dim ? UZ_GIVEN_ELEMENT : UZ_GIVEN_SIDE;
 }
 
 static uz_status add_group(uz_given_mesh *out, const cells *mesh, const cells_set *set, const int64_t *new_cell,
-                           int way)
+                           uz_given_way way)
 {
-    uz_given_group *to = &out->groups[out->n_groups];
-    int64_t items = 0, places = 0;
-    for (int64_t i = 0; i < set->count; i++)
-        if (way_of(mesh, set, i, out->dim) == way) {
-            items++;
-            places += set->nodes ? 1 : mesh->first[set->index[i] + 1] - mesh->first[set->index[i]];
-        }
-    if (items == 0)
-        return UZ_OK;
-    out->n_groups++;
-    if (way == BY_ELEMENTS)
-        to->element = uz_alloc(items, sizeof *to->element);
-    if (way == BY_NODES)
-        to->node = uz_alloc(places, sizeof *to->node);
-    if (way == BY_SIDES) {
-        to->face_first = uz_alloc_zero(items + 1, sizeof *to->face_first);
-        to->face_node = uz_alloc(places, sizeof *to->face_node);
-    }
-    if (way == BY_ELEMENTS ? !to->element : way == BY_NODES ? !to->node : !to->face_first || !to->face_node)
-        return uz_no_memory(mesh->err, "the mesh");
+    uz_given_members members = {.to = &out->groups[out->n_groups]};
+    bool any = false;
     for (int64_t i = 0; i < set->count; i++) {
-        const int64_t index = set->index[i];
+        const int64_t index = set->index[i], *node = set->nodes ? &index : mesh->node + mesh->first[index];
         if (way_of(mesh, set, i, out->dim) != way)
             continue;
-        if (way == BY_ELEMENTS) {
-            to->element[to->n_elements++] = new_cell[index];
-        } else if (set->nodes) {
-            to->node[to->n_nodes++] = index;
-        } else {
-            const int64_t *node = mesh->node + mesh->first[index], n = mesh->first[index + 1] - mesh->first[index];
-            int64_t *at = way == BY_NODES ? to->node + to->n_nodes : to->face_node + to->face_first[to->n_faces];
-            memcpy(at, node, (size_t)n * sizeof *node);
-            if (way == BY_NODES) {
-                to->n_nodes += n;
-            } else {
-                to->face_first[to->n_faces + 1] = to->face_first[to->n_faces] + n;
-                to->n_faces++;
-            }
-        }
+        out->n_groups += !any;
+        any = true;
+        if (!uz_given_add(&members, way, set->nodes ? -1 : new_cell[index], node,
+                          set->nodes ? 1 : mesh->first[index + 1] - mesh->first[index]))
+            return uz_no_memory(mesh->err, "the mesh");
     }
     return UZ_OK;
 }
@@ -252,11 +222,11 @@ static bool is_taken(const uz_given_mesh *out, const char *name)
 
 static uz_status add_groups(uz_given_mesh *out, const cells *mesh, const int64_t *new_cell)
 {
-    static const char *const SUFFIX[WAYS] = {".elements", ".sides", ".nodes"};
-    if (!(out->groups = uz_alloc_zero(WAYS * mesh->n_sets, sizeof *out->groups)))
+    static const char *const SUFFIX[UZ_GIVEN_WAYS] = {".elements", ".sides", ".nodes"};
+    if (!(out->groups = uz_alloc_zero(UZ_GIVEN_WAYS * mesh->n_sets, sizeof *out->groups)))
         return uz_no_memory(mesh->err, "the mesh");
     for (int64_t s = 0; s < mesh->n_sets; s++)
-        for (int way = 0; way < WAYS; way++) {
+        for (uz_given_way way = 0; way < UZ_GIVEN_WAYS; way++) {
             char name[80];
             const int64_t before = out->n_groups;
             const uz_status status = add_group(out, mesh, &mesh->sets[s], new_cell, way);

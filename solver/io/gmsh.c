@@ -16,10 +16,9 @@
  * nodes. Its name is the file's; without one "physical_7", or "physical_7_dim1" for those of lower dimension where
  * several dimensions have a nameless 7. */
 
-/* A physical group, and how much of the mesh it has. */
 typedef struct {
     gmsh_key key;
-    int64_t items, nodes; /* elements or faces, and the nodes of faces */
+    uz_given_members members;
 } physical_group;
 
 typedef struct {
@@ -90,7 +89,7 @@ static uz_status list_groups(grouping *g)
             if (!uz_grow(&g->group, g->n_groups, 1, &room, sizeof *g->group))
                 return gmsh_no_memory(file);
             g->group[g->n_groups++] =
-                (physical_group){{file->parts[i].key.dim, file->physical[file->parts[i].first + k]}, 0, 0};
+                (physical_group){.key = {file->parts[i].key.dim, file->physical[file->parts[i].first + k]}};
         }
     if (g->n_groups > 1)
         qsort(g->group, (size_t)g->n_groups, sizeof *g->group, gmsh_compare);
@@ -104,8 +103,8 @@ static uz_status list_groups(grouping *g)
     return UZ_OK;
 }
 
-/* Goes through the members of all groups: counts them, or adds them. */
-static void walk_members(grouping *g, bool add)
+/* The members of all groups. */
+static uz_status add_members(grouping *g)
 {
     gmsh_part *last = NULL;
     for (int64_t e = 0; e < g->file->n_elements; e++) {
@@ -114,22 +113,15 @@ static void walk_members(grouping *g, bool add)
         for (int64_t k = 0; part && k < part->count; k++) {
             const gmsh_key key = {part->key.dim, g->file->physical[part->first + k]};
             physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof *g->group, gmsh_compare);
-            uz_given_group *to = &g->out->groups[found - g->group];
-            if (!add) {
-                found->items++;
-                found->nodes += n;
-            } else if (part->key.dim == g->dim) {
-                to->element[to->n_elements++] = g->new_element[e];
-            } else if (part->key.dim == g->dim - 1) {
-                memcpy(to->face_node + to->face_first[to->n_faces], node, (size_t)n * sizeof *node);
-                to->n_faces++;
-                to->face_first[to->n_faces] = to->face_first[to->n_faces - 1] + n;
-            } else {
-                memcpy(to->node + to->n_nodes, node, (size_t)n * sizeof *node);
-                to->n_nodes += n;
-            }
+            const uz_given_way way = part->key.dim == g->dim       ? UZ_GIVEN_ELEMENT
+                                     : part->key.dim == g->dim - 1 ? UZ_GIVEN_SIDE
+                                                                   : UZ_GIVEN_NODES;
+            found->members.to = &g->out->groups[found - g->group];
+            if (!uz_given_add(&found->members, way, g->new_element[e], node, n))
+                return gmsh_no_memory(g->file);
         }
     }
+    return UZ_OK;
 }
 
 static const gmsh_name *find_name(const gmsh_file *file, gmsh_key key)
@@ -139,12 +131,12 @@ static const gmsh_name *find_name(const gmsh_file *file, gmsh_key key)
     return bsearch(&key, file->names, (size_t)file->n_names, sizeof *file->names, gmsh_compare);
 }
 
-static uz_status make_group(const grouping *g, int64_t i)
+static void name_group(const grouping *g, int64_t i)
 {
     const physical_group *from = &g->group[i];
     uz_given_group *to = &g->out->groups[i];
     const gmsh_name *found = find_name(g->file, from->key);
-    bool good, shared = false; /* has a nameless group of higher dimension the same tag? */
+    bool shared = false; /* has a nameless group of higher dimension the same tag? */
     for (int dim = from->key.dim + 1; dim <= 3 && !found; dim++) {
         const gmsh_key key = {dim, from->key.tag};
         shared = shared || (!find_name(g->file, key) &&
@@ -156,18 +148,6 @@ static uz_status make_group(const grouping *g, int64_t i)
         snprintf(to->name, 64, "physical_%lld_dim%d", (long long)from->key.tag, from->key.dim);
     else
         snprintf(to->name, 64, "physical_%lld", (long long)from->key.tag);
-    if (from->key.dim == g->dim) {
-        good = (to->element = uz_alloc(from->items, sizeof *to->element)) != NULL;
-    } else if (from->key.dim == g->dim - 1) {
-        to->face_first = uz_alloc(from->items + 1, sizeof *to->face_first);
-        to->face_node = uz_alloc(from->nodes, sizeof *to->face_node);
-        good = to->face_first && to->face_node;
-        if (good)
-            to->face_first[0] = 0;
-    } else {
-        good = (to->node = uz_alloc(from->nodes, sizeof *to->node)) != NULL;
-    }
-    return good ? UZ_OK : gmsh_no_memory(g->file);
 }
 
 /* new_element: the number of each element of the file in the mesh, -1: it is none of its elements. */
@@ -181,14 +161,12 @@ static uz_status make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const
         status = gmsh_no_memory(file);
     if (status == UZ_OK) {
         out->n_groups = g.n_groups;
-        walk_members(&g, false);
         if (file->n_names > 1)
             qsort(file->names, (size_t)file->n_names, sizeof *file->names, gmsh_compare);
+        for (int64_t i = 0; i < g.n_groups; i++)
+            name_group(&g, i);
+        status = add_members(&g);
     }
-    for (int64_t i = 0; i < g.n_groups && status == UZ_OK; i++)
-        status = make_group(&g, i);
-    if (status == UZ_OK)
-        walk_members(&g, true);
     free(g.group);
     return status;
 }

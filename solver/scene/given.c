@@ -137,3 +137,28 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
         uz_mesh_clear(out);
     return status;
 }
+
+bool uz_given_add(uz_given_members *members, uz_given_way way, int64_t element, const int64_t *node, int64_t n)
+{
+    uz_given_group *to = members->to;
+    int64_t *room = members->room;
+    if (way == UZ_GIVEN_ELEMENT) {
+        if (!uz_grow(&to->element, to->n_elements, 1, &room[0], sizeof *to->element))
+            return false;
+        to->element[to->n_elements++] = element;
+    } else if (way == UZ_GIVEN_SIDE) {
+        const int64_t used = to->n_faces > 0 ? to->face_first[to->n_faces] : 0;
+        if (!uz_grow(&to->face_first, to->n_faces + 1, 1, &room[1], sizeof *to->face_first) ||
+            !uz_grow(&to->face_node, used, n, &room[2], sizeof *to->face_node))
+            return false;
+        memcpy(to->face_node + used, node, (size_t)n * sizeof *node);
+        to->face_first[to->n_faces] = used;
+        to->face_first[++to->n_faces] = used + n;
+    } else {
+        if (!uz_grow(&to->node, to->n_nodes, n, &room[3], sizeof *to->node))
+            return false;
+        memcpy(to->node + to->n_nodes, node, (size_t)n * sizeof *node);
+        to->n_nodes += n;
+    }
+    return true;
+}

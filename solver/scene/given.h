@@ -9,6 +9,15 @@ enum { UZ_POINTER = 96 };
 /* Most groups of a mesh. */
 #define UZ_MESH_MAX_GROUPS 4096
 
+/* Members that a group, empty at first, gets one by one; zeroed but for `to`. */
+typedef struct {
+    uz_given_group *to;
+    int64_t room[4];
+} uz_given_members;
+typedef enum { UZ_GIVEN_ELEMENT, UZ_GIVEN_SIDE, UZ_GIVEN_NODES, UZ_GIVEN_WAYS } uz_given_way;
+/* Adds an element, a side by its n nodes, or these. False: no memory, and what is there stays. */
+bool uz_given_add(uz_given_members *members, uz_given_way way, int64_t element, const int64_t *node, int64_t n);
+
 /* Refuses an element: "element 12 (quad4 with nodes 4, 7, 9, 3) WHAT; REMEDY" at "/mesh/elements/quad4/3", or where
  * the file is. */
 enum { UZ_ELEMENT_TEXT = 160 };

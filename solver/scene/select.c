@@ -146,32 +146,22 @@ static bool side_is_there(const selecting *w, uz_face face)
 static uz_status select_sides(uz_group *out, const selecting *w)
 {
     const uz_corner_table *sides = w->sides;
-    int64_t count = 0, nodes = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int64_t i = 0; i < sides->count; i++) {
-            int64_t node[UZ_FACE_NODES];
-            if (sides->same[i] || sides->same[i + 1] || !side_is_there(w, sides->item[i]))
-                continue;
-            const int n = uz_mesh_face(node, w->mesh, sides->item[i]);
-            if (pass == 0) {
-                count++;
-                nodes += n;
-            } else {
-                out->face[out->n_faces++] = sides->item[i];
-                memcpy(out->node + out->n_nodes, node, (size_t)n * sizeof *node);
-                out->n_nodes += n;
-            }
-        }
-        if (count == 0)
-            return UZ_OK;
-        if (pass == 0) {
-            out->kind = UZ_GROUP_FACES;
-            out->face = uz_alloc(count, sizeof *out->face);
-            out->node = uz_alloc(nodes, sizeof *out->node);
-            if (!out->face || !out->node)
-                return uz_no_memory(w->err, "the groups of a scene");
-        }
+    int64_t faces = 0, places = 0; /* room for them */
+    for (int64_t i = 0; i < sides->count; i++) {
+        int64_t node[UZ_FACE_NODES];
+        if (sides->same[i] || sides->same[i + 1] || !side_is_there(w, sides->item[i]))
+            continue;
+        const int n = uz_mesh_face(node, w->mesh, sides->item[i]);
+        if (!uz_grow(&out->face, out->n_faces, 1, &faces, sizeof *out->face) ||
+            !uz_grow(&out->node, out->n_nodes, n, &places, sizeof *out->node))
+            return uz_no_memory(w->err, "the groups of a scene");
+        out->face[out->n_faces++] = sides->item[i];
+        memcpy(out->node + out->n_nodes, node, (size_t)n * sizeof *node);
+        out->n_nodes += n;
     }
+    if (out->n_faces == 0)
+        return UZ_OK;
+    out->kind = UZ_GROUP_FACES;
     qsort(out->face, (size_t)out->n_faces, sizeof *out->face, uz_face_order);
     out->n_nodes = uz_sort_unique(out->node, out->n_nodes);
     return UZ_OK;
@@ -205,7 +195,7 @@ static uz_status select_nodes(uz_group *out, const selecting *w)
 static uz_status select_elements(uz_group *out, const selecting *w)
 {
     const uz_mesh *mesh = w->mesh;
-    int64_t places = 0;
+    int64_t places = 0; /* room for them */
     out->element = uz_alloc(mesh->n_elements, sizeof *out->element);
     if (!out->element)
         return uz_no_memory(w->err, "the groups of a scene");
@@ -216,19 +206,14 @@ static uz_status select_elements(uz_group *out, const selecting *w)
         for (int k = 0; k < corners; k++)
             for (int c = 0; c < mesh->dim; c++)
                 middle[c] += mesh->xyz[mesh->node[mesh->first[e] + k] * mesh->dim + c] / corners;
-        if (distance(w, middle) <= w->tolerance) {
-            out->element[out->n_elements++] = e;
-            places += mesh->first[e + 1] - mesh->first[e];
-        }
-    }
-    out->node = uz_alloc(places, sizeof *out->node);
-    if (!out->node)
-        return uz_no_memory(w->err, "the groups of a scene");
-    for (int64_t k = 0; k < out->n_elements; k++) {
-        int count;
-        const int64_t *node = uz_mesh_element(mesh, out->element[k], &count);
-        memcpy(out->node + out->n_nodes, node, (size_t)count * sizeof *node);
-        out->n_nodes += count;
+        if (!(distance(w, middle) <= w->tolerance))
+            continue;
+        const int64_t *node = mesh->node + mesh->first[e], n = mesh->first[e + 1] - mesh->first[e];
+        if (!uz_grow(&out->node, out->n_nodes, n, &places, sizeof *out->node))
+            return uz_no_memory(w->err, "the groups of a scene");
+        out->element[out->n_elements++] = e;
+        memcpy(out->node + out->n_nodes, node, (size_t)n * sizeof *node);
+        out->n_nodes += n;
     }
     out->n_nodes = uz_sort_unique(out->node, out->n_nodes);
     return UZ_OK;
