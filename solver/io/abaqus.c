@@ -6,6 +6,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "io/mesh_reader.h"
+#include "scene/given.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -399,15 +400,8 @@ static uz_status add_body(uz_given_mesh *out, const abaqus_file *file, int64_t *
     }
     out->n_nodes = file->nodes.count;
     out->from_file = "/mesh/abaqus";
-    out->xyz = uz_alloc(out->n_nodes * out->dim, sizeof *out->xyz);
-    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
-    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
-    out->node = uz_alloc(places, sizeof *out->node);
-    if (!out->xyz || !out->kind || !out->first || !out->node)
+    if (!uz_given_room(out, file->xyz, places))
         return abaqus_no_memory(&file->text);
-    for (int64_t i = 0; i < out->n_nodes; i++)
-        memcpy(out->xyz + i * out->dim, file->xyz + 3 * i, (size_t)out->dim * sizeof(double));
-    out->first[0] = 0;
     for (int64_t e = 0; e < file->elements.count; e++) {
         const int64_t to = new_element[e];
         if (to < 0)

@@ -5,7 +5,6 @@
 #include "core/error.h"
 #include "scene/given.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,30 +127,18 @@ uz_status cells_add_values(cells *mesh, const char *name, const int64_t *value, 
 
 /* ---- the body */
 
-/* The highest dimension; a plane body is one with z constant but for rounding. */
-static uz_status choose_dim(int *dim, const cells *mesh, const char *advice)
+/* The highest dimension, and the line of the first cell that has it. */
+static uz_status choose_dim(int *dim, int64_t *line, const cells *mesh, const char *advice)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     int64_t at = 0;
     *dim = 0;
     for (int64_t e = 0; e < mesh->n_cells; e++) {
         at = dim_of(mesh->shape[e]) > *dim ? e : at;
         *dim = dim_of(mesh->shape[at]);
     }
-    const int64_t line = mesh->n_cells > 0 ? mesh->line[at] : 1;
+    *line = mesh->n_cells > 0 ? mesh->line[at] : 1;
     if (*dim < 2)
-        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line, "there are no elements of a body; %s", advice);
-    for (int64_t e = 0; *dim == 2 && e < mesh->n_cells; e++)
-        for (int64_t q = mesh->first[e]; q < mesh->first[e + 1] && dim_of(mesh->shape[e]) == 2; q++)
-            for (int c = 0; c < 3; c++) {
-                low[c] = fmin(low[c], mesh->xyz[3 * mesh->node[q] + c]);
-                high[c] = fmax(high[c], mesh->xyz[3 * mesh->node[q] + c]);
-            }
-    if (*dim == 2 && !(high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1])))
-        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line,
-                            "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
-                            "modelled: %s, or turn a plane body into the plane of x and y",
-                            advice);
+        return uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, *line, "there are no elements of a body; %s", advice);
     return UZ_OK;
 }
 
@@ -165,15 +152,8 @@ static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_ce
         places += body ? mesh->first[e + 1] - mesh->first[e] : 0;
     }
     out->n_nodes = mesh->n_nodes;
-    out->xyz = uz_alloc(out->n_nodes * out->dim, sizeof *out->xyz);
-    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
-    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
-    out->node = uz_alloc(places, sizeof *out->node);
-    if (!out->xyz || !out->kind || !out->first || !out->node)
+    if (!uz_given_room(out, mesh->xyz, places))
         return uz_no_memory(mesh->err, "the mesh");
-    for (int64_t i = 0; i < out->n_nodes; i++)
-        memcpy(out->xyz + i * out->dim, mesh->xyz + 3 * i, (size_t)out->dim * sizeof(double));
-    out->first[0] = 0;
     for (int64_t e = 0; e < mesh->n_cells; e++) {
         const int64_t to = new_cell[e], count = mesh->first[e + 1] - mesh->first[e];
         if (to < 0)
@@ -247,11 +227,16 @@ static uz_status add_groups(uz_given_mesh *out, const cells *mesh, const int64_t
 
 uz_status cells_to_given(uz_given_mesh *out, const cells *mesh, const char *from_file, const char *advice)
 {
-    int64_t *new_cell = uz_alloc(mesh->n_cells, sizeof *new_cell);
+    int64_t *new_cell = uz_alloc(mesh->n_cells, sizeof *new_cell), line = 1;
     memset(out, 0, sizeof *out);
-    uz_status status = new_cell ? choose_dim(&out->dim, mesh, advice) : uz_no_memory(mesh->err, "the mesh");
+    uz_status status = new_cell ? choose_dim(&out->dim, &line, mesh, advice) : uz_no_memory(mesh->err, "the mesh");
     if (status == UZ_OK)
         status = add_body(out, mesh, new_cell);
+    if (status == UZ_OK && out->dim == 2 && !uz_given_is_flat(out, mesh->xyz))
+        status = uz_fail_line(mesh->err, UZ_ERR_UNSUPPORTED, line,
+                              "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
+                              "modelled: %s, or turn a plane body into the plane of x and y",
+                              advice);
     if (status == UZ_OK)
         status = add_groups(out, mesh, new_cell);
     free(new_cell);

@@ -5,7 +5,6 @@
 #include "io/mesh_reader.h"
 #include "scene/given.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -184,19 +183,6 @@ static uz_status choose_dim(int *dim, const gmsh_file *file)
         return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
                             "there are only %s; mesh the surface of a plane body, or the volume of a solid",
                             *dim == 1 ? "lines" : "points");
-    /* Do all surfaces lie in one plane z = constant, but for rounding? */
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int64_t e = 0; *dim == 2 && e < file->n_elements; e++)
-        for (int64_t q = file->first[e]; q < file->first[e + 1] && gmsh_type_of(file->type[e]).dim == 2; q++)
-            for (int c = 0; c < 3; c++) {
-                low[c] = fmin(low[c], file->xyz[3 * file->node[q] + c]);
-                high[c] = fmax(high[c], file->xyz[3 * file->node[q] + c]);
-            }
-    if (*dim == 2 && !(high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1])))
-        return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
-                            "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
-                            "modelled: mesh the volume (and save it: as a physical volume, or with Mesh.SaveAll), or "
-                            "turn a plane body into the plane of x and y");
     return UZ_OK;
 }
 
@@ -228,17 +214,8 @@ static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
     out->dim = dim;
     out->n_nodes = file->n_nodes;
     out->from_file = "/mesh/gmsh";
-    out->xyz = uz_alloc(file->n_nodes * dim, sizeof *out->xyz);
-    status = out->xyz ? UZ_OK : gmsh_no_memory(file);
-    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)
-        memcpy(out->xyz + i * dim, file->xyz + 3 * i, (size_t)dim * sizeof(double));
-    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
-    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
-    out->node = uz_alloc(places, sizeof *out->node);
-    if (status == UZ_OK && (!out->kind || !out->first || !out->node))
+    if (!uz_given_room(out, file->xyz, places))
         status = gmsh_no_memory(file);
-    if (status == UZ_OK)
-        out->first[0] = 0;
     for (int64_t e = 0, done = 0, at = 0; status == UZ_OK && e < file->n_elements; e++) {
         if (new_element[e] < done)
             continue; /* no element of the body, or repeated */
@@ -250,6 +227,11 @@ static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
         out->kind[done++] = (unsigned char)kind;
         out->first[done] = at;
     }
+    if (status == UZ_OK && dim == 2 && !uz_given_is_flat(out, file->xyz))
+        status = gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
+                              "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
+                              "modelled: mesh the volume (and save it: as a physical volume, or with Mesh.SaveAll), or "
+                              "turn a plane body into the plane of x and y");
     if (status == UZ_OK)
         status = make_groups(out, file, dim, new_element);
     free(new_element);

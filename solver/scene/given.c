@@ -138,6 +138,29 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
     return status;
 }
 
+bool uz_given_room(uz_given_mesh *given, const double *xyz, int64_t places)
+{
+    const int dim = given->dim;
+    given->xyz = uz_alloc(given->n_nodes * dim, sizeof *given->xyz);
+    given->kind = uz_alloc(given->n_elements, sizeof *given->kind);
+    given->first = uz_alloc_zero(given->n_elements + 1, sizeof *given->first);
+    given->node = uz_alloc(places, sizeof *given->node);
+    for (int64_t i = 0; given->xyz && i < given->n_nodes; i++)
+        memcpy(given->xyz + i * dim, xyz + 3 * i, (size_t)dim * sizeof *xyz);
+    return given->xyz && given->kind && given->first && given->node;
+}
+
+bool uz_given_is_flat(const uz_given_mesh *given, const double *xyz)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int64_t q = 0; q < given->first[given->n_elements]; q++)
+        for (int c = 0; c < 3; c++) {
+            low[c] = fmin(low[c], xyz[3 * given->node[q] + c]);
+            high[c] = fmax(high[c], xyz[3 * given->node[q] + c]);
+        }
+    return high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1]);
+}
+
 bool uz_given_add(uz_given_members *members, uz_given_way way, int64_t element, const int64_t *node, int64_t n)
 {
     uz_given_group *to = members->to;

@@ -9,6 +9,12 @@ enum { UZ_POINTER = 96 };
 /* Most groups of a mesh. */
 #define UZ_MESH_MAX_GROUPS 4096
 
+/* Room for a body whose dim, n_nodes and n_elements are there, with `places` nodes of elements in all; its coordinates
+ * are the first of xyz (n_nodes x 3), and first[0] is 0. False: no memory. */
+bool uz_given_room(uz_given_mesh *given, const double *xyz, int64_t places);
+/* Do all nodes of elements lie in one plane z = constant, but for rounding? xyz: n_nodes x 3. */
+bool uz_given_is_flat(const uz_given_mesh *given, const double *xyz);
+
 /* Members that a group, empty at first, gets one by one; zeroed but for `to`. */
 typedef struct {
     uz_given_group *to;
