@@ -132,3 +132,130 @@ uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_level *level
     return ok ? UZ_OK
               : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)(n_nodes * level->A.b));
 }
+
+/* ------------------------------------------------------------------ in parts */
+
+/* Nodes of a part of a coarse level at least: some 30 microseconds of a sweep. A rest that is more of all nodes is not
+ * worth it. */
+#define PART_LEAST 200
+#define MOST_REST  0.2
+
+/* The part that a node is of, or whose seam it is of. */
+static int8_t part_of(const uz_blocks *A, int64_t node)
+{
+    const int64_t *first = node < A->part[A->parts] ? A->part : A->seam;
+    int8_t part = 0;
+    while (part + 1 < A->parts && node >= first[part + 1])
+        part++;
+    return part;
+}
+
+/* The first part among those of a node and its neighbours. */
+typedef struct {
+    const uz_blocks *A;
+    const uz_below *below;
+    const int8_t *from;
+    int8_t *to;
+} spread;
+
+static void spread_to(void *ctx, int64_t begin, int64_t end)
+{
+    const spread *x = ctx;
+    for (int64_t i = begin; i < end; i++) {
+        int8_t first = x->from[i];
+        for (int64_t e = x->A->ptr[i]; e < x->A->ptr[i + 1]; e++)
+            first = x->from[x->A->idx[e]] < first ? x->from[x->A->idx[e]] : first;
+        for (int64_t e = x->below->ptr[i]; e < x->below->ptr[i + 1]; e++)
+            first = x->from[x->below->node[e]] < first ? x->from[x->below->node[e]] : first;
+        x->to[i] = first;
+    }
+}
+
+/* Aggregates have a block with each other where nodes that smoothed modes of theirs reach, their own and the neighbours
+ * of these, are neighbours, three links apart at most. */
+enum { LINKS = 3 };
+
+bool uz_part_aggregates(uz_blocks *parts, int32_t *aggregate, int64_t count, const uz_level *level,
+                        const uz_below *below)
+{
+    const uz_blocks *A = &level->A;
+    const int most = A->parts;
+    if (most < 2 || count < most * PART_LEAST)
+        return true;
+    int8_t *part = uz_alloc(count, sizeof *part), *near = uz_alloc(A->nodes, sizeof *near),
+           *next = uz_alloc(A->nodes, sizeof *next);
+    bool *rest = uz_alloc_zero(count, sizeof *rest);
+    int32_t *number = uz_alloc(count, sizeof *number);
+    const bool ok = part && near && next && rest && number;
+    if (ok) {
+        memset(part, most, (size_t)count * sizeof *part);
+        for (int64_t i = 0; i < A->nodes; i++)
+            if (aggregate[i] >= 0 && part[aggregate[i]] == most)
+                part[aggregate[i]] = part_of(A, i);
+        for (int64_t i = 0; i < A->nodes; i++)
+            near[i] = aggregate[i] >= 0 ? part[aggregate[i]] : (int8_t)most;
+        for (int link = 0; link < LINKS; link++) {
+            uz_by_pieces(spread_to, &(spread){A, below, near, next}, A->nodes);
+            int8_t *const done = near;
+            near = next;
+            next = done;
+        }
+        int64_t left = 0, at = 0;
+        for (int64_t i = 0; i < A->nodes; i++)
+            if (aggregate[i] >= 0 && near[i] < part[aggregate[i]])
+                rest[aggregate[i]] = true;
+        for (int64_t a = 0; a < count; a++)
+            left += rest[a];
+        if ((double)left <= MOST_REST * (double)count) {
+            parts->parts = most;
+            for (int p = 0; p < 2 * most; p++) {
+                *(p < most ? parts->part + p : parts->seam + p - most) = at;
+                for (int64_t a = 0; a < count; a++)
+                    if (part[a] == p % most && rest[a] == (p >= most))
+                        number[a] = (int32_t)at++;
+            }
+            parts->part[most] = parts->seam[0];
+            parts->seam[most] = count;
+            for (int64_t i = 0; i < A->nodes; i++)
+                aggregate[i] = aggregate[i] >= 0 ? number[aggregate[i]] : aggregate[i];
+        }
+    }
+    free(part);
+    free(near);
+    free(next);
+    free(rest);
+    free(number);
+    return ok;
+}
+
+bool uz_blocks_take_parts(uz_blocks *A, const uz_blocks *parts)
+{
+    const int64_t *part = parts->part, *seam = parts->seam;
+    if (parts->parts == 0)
+        return true;
+    int8_t *taken = uz_alloc(A->nodes, sizeof *taken); /* by a seam */
+    bool apart = true, seams_apart = true;
+    for (int p = 0; taken && p < parts->parts; p++)
+        for (int64_t i = part[p]; i < part[p + 1]; i++)
+            apart = apart && (A->ptr[i] == A->ptr[i + 1] || A->idx[A->ptr[i]] >= part[p]);
+    if (taken)
+        memset(taken, -1, (size_t)A->nodes * sizeof *taken);
+    for (int8_t s = 0; taken && s < parts->parts; s++)
+        for (int64_t i = seam[s]; i < seam[s + 1]; i++) {
+            seams_apart = seams_apart && (taken[i] < 0 || taken[i] == s);
+            taken[i] = s;
+            for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
+                seams_apart = seams_apart && (taken[A->idx[e]] < 0 || taken[A->idx[e]] == s);
+                taken[A->idx[e]] = s;
+            }
+        }
+    if (apart) {
+        A->parts = parts->parts;
+        memcpy(A->part, part, sizeof A->part);
+        memcpy(A->seam, seam, sizeof A->seam);
+        A->seams = seams_apart ? parts->parts : 0;
+    }
+    const bool ok = taken != NULL;
+    free(taken);
+    return ok;
+}

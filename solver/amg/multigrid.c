@@ -200,14 +200,16 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
     int32_t *aggregate = uz_alloc(A->nodes, sizeof *aggregate);
     float *basis = uz_alloc(n * k, sizeof *basis), *coarse = NULL;
     uz_below below;
+    uz_blocks parts = {.parts = 0};
     double range = 1.0;
     uz_status status = uz_below_init(&below, A) && aggregate && basis ? UZ_OK : fail_memory(n, err);
     if (status == UZ_OK)
         status = uz_aggregate(aggregate, &level->aggregates, level, &below, threshold, err);
     *done = status == UZ_OK && (level->aggregates == 0 || (double)(level->aggregates * k) > LEAST_GAIN * (double)n);
     if (status == UZ_OK && !*done) {
+        const bool parted = uz_part_aggregates(&parts, aggregate, level->aggregates, level, &below);
         coarse = uz_alloc(level->aggregates * k * k, sizeof *coarse);
-        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarse ? UZ_OK : fail_memory(n, err);
+        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : parted && coarse ? UZ_OK : fail_memory(n, err);
         if (status == UZ_OK)
             status = uz_tentative(basis, coarse, *modes, aggregate, A->nodes, A->b, level->aggregates, k, err);
         if (status == UZ_OK)
@@ -216,6 +218,8 @@ static uz_status coarsen(uz_level *level, bool *done, float **modes, double thre
             status = uz_prolong_smoothed(level, &below, basis, aggregate, 4.0 / 3.0 / range, k, stop, err);
         if (status == UZ_OK)
             status = make_next(level, &below, k, team, stop, err);
+        if (status == UZ_OK && !uz_blocks_take_parts(&level[1].A, &parts))
+            status = fail_memory(n, err);
         free(*modes);
         *modes = coarse;
     }

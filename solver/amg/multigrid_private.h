@@ -195,6 +195,13 @@ void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t
 /* aggregate (nodes): the aggregate of each node, -1 for nodes that hang on no other strongly. *count: aggregates. */
 uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_level *level, const uz_below *below,
                        double threshold, uz_error *err);
+/* Numbers the aggregates anew, so that the next level is in parts as this one is, where it is and they are enough:
+ * parts->parts, part and seam are filled as uz_blocks says, seams is 0. False: no memory. */
+bool uz_part_aggregates(uz_blocks *parts, int32_t *aggregate, int64_t count, const uz_level *level,
+                        const uz_below *below);
+/* A (ptr, idx) gets the parts that its nodes were numbered by, if its blocks agree, and seams, where they are such.
+ * False: no memory. */
+bool uz_blocks_take_parts(uz_blocks *A, const uz_blocks *parts);
 
 /* basis (nodes b x k): the modes of each aggregate made orthonormal, 0 where there are none; coarse (aggregates x k x
  * k): the modes in that basis, row by row: those of the coarse level. */

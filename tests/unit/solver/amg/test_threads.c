@@ -28,6 +28,7 @@ static void make_and_apply(double *z, double *y, double *s, double *w, const bri
     CHECK_INT(uz_aside_used(), threads);
     CHECK(mg->levels > 2);
     CHECK(((uz_aggregates *)mg)->level[0].A.seams > 2);
+    CHECK(((uz_aggregates *)mg)->level[1].A.seams > 2);
     CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
     CHECK_INT(uz_multigrid_apply(mg, &b->K, cg.room, z, x, &err), UZ_OK);
     mg->kind->multiply(mg, &b->K, cg.room, y, x);
