@@ -332,6 +332,11 @@ static void take_step(sharing *x, int what)
         take_rest(x);
 }
 
+static void clear(void *ctx, int64_t begin, int64_t end)
+{
+    memset((float *)ctx + begin, 0, (size_t)(end - begin) * sizeof(float));
+}
+
 void uz_level_take_step(const uz_level_step *s, int parts)
 {
     sharing x = {.step = s, .take = !uz_cpu_has_avx2_fma() ? take_plain : s->lanes == 1 ? take_fused : take_both_fused};
@@ -343,7 +348,7 @@ void uz_level_take_step(const uz_level_step *s, int parts)
     if (parts & UZ_STEP_PROLONG)
         take_step(&x, UZ_STEP_PROLONG);
     if (parts & UZ_STEP_SWEEP_UP) {
-        memset(s->t, 0, (size_t)(s->level->A.nodes * s->lanes * uz_width(s->level->A.b)) * sizeof *s->t);
+        uz_by_pieces(clear, s->t, s->level->A.nodes * s->lanes * uz_width(s->level->A.b));
         take_step(&x, UZ_STEP_SWEEP_UP);
     }
 }

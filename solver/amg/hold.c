@@ -200,12 +200,20 @@ static bool lose_by_parts(losing *x, void (*run)(void *ctx, int part))
     return ok;
 }
 
+static void look_for_held(void *ctx, int64_t begin, int64_t end)
+{
+    const losing *x = ctx;
+    const int b = x->fine->A.b;
+    for (int64_t i = begin; i < end; i++)
+        x->any[i] = is_any_held(x->inverse + i * b, x->fine->inverse + i * b, b);
+}
+
 bool uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
 {
     const int64_t nodes = fine->A.nodes;
     losing x = {.loss = loss, .fine = fine, .inverse = inverse, .any = uz_alloc(nodes, sizeof *x.any)};
-    for (int64_t i = 0; x.any && i < nodes; i++)
-        x.any[i] = is_any_held(inverse + i * fine->A.b, fine->inverse + i * fine->A.b, fine->A.b);
+    if (x.any)
+        uz_by_pieces(look_for_held, &x, nodes);
     const bool ok = x.any && lose_by_parts(&x, lose_part);
     free(x.any);
     return ok;
@@ -219,12 +227,12 @@ static bool is_zero(const double *block, int64_t size)
     return k == size;
 }
 
-static void look_for_losses(void *ctx, int64_t begin, int64_t end)
+static void look_for_losses(void *ctx, int part)
 {
     const losing *x = ctx;
     const uz_blocks *from = x->from;
     const int64_t size = (int64_t)from->b * from->b;
-    for (int64_t i = begin; i < end; i++)
+    for (int64_t i = x->first[part]; i < x->first[part + 1]; i++)
         x->any[i] = !is_zero(from->diag + i * size, size) ||
                     !is_zero(from->off + from->ptr[i] * size, (from->ptr[i + 1] - from->ptr[i]) * size);
 }
@@ -252,9 +260,13 @@ static void pass_part(void *ctx, int part)
 static bool pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level, const uz_team *team)
 {
     const int64_t begin = uz_team_first(team, 0, loss->nodes), end = uz_team_first(team, 1, loss->nodes);
+    const int parts = end - begin < 2 * PART_LEAST ? 1 : uz_aside_threads();
     losing x = {.loss = next, .fine = level, .from = loss, .any = uz_alloc_zero(loss->nodes, sizeof *x.any)};
+    for (int part = 0; part <= parts; part++)
+        x.first[part] = (int32_t)(begin + (end - begin) * part / parts);
     if (x.any)
-        look_for_losses(&x, begin, end);
+        uz_aside_share(look_for_losses, &x, parts);
+    x.first[0] = 0; /* what is lost is shared out by all rows of the next level */
     const bool ok = x.any && lose_by_parts(&x, pass_part);
     free(x.any);
     uz_team_sum(team, next);
@@ -409,8 +421,8 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
     uz_blocks loss = {0};
     float *inverse = room->own[0].inverse = uz_alloc(slots, sizeof *inverse);
     uz_status status = inverse ? UZ_OK : fail_memory(mg->base.n, err);
-    for (int64_t j = 0; inverse && j < slots; j++)
-        inverse[j] = finest->inverse[j];
+    if (inverse)
+        memcpy(inverse, finest->inverse, (size_t)slots * sizeof *inverse);
     for (int64_t j = 0; inverse && j < mg->base.n; j++)
         if (held[j])
             inverse[uz_slot_number(mg, mg->slot[j])] = 0.0F;

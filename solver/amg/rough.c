@@ -58,9 +58,11 @@ static void enter_sweep_up(void *ctx, int64_t begin, int64_t end)
 {
     const rough *v = ctx;
     const float *restrict d = v->d, *restrict s = v->s;
-    float *restrict b = v->b;
-    for (int64_t j = begin; j < end; j++)
+    float *restrict b = v->b, *restrict z = v->z;
+    for (int64_t j = begin; j < end; j++) {
         b[j] = d[j] * s[j];
+        z[j] = 0.0F;
+    }
 }
 
 static void leave_sweep_up(void *ctx, int64_t begin, int64_t end)
@@ -78,7 +80,6 @@ static uz_status precondition(rough *v, uz_error *err)
     uz_level_take_step(&v->step, UZ_STEP_RESTRICT);
     const uz_status status = uz_cycle_below(v->mg, v->room, 1, 1, err);
     uz_by_pieces(enter_sweep_up, v, v->n);
-    memset(v->z, 0, (size_t)v->n * sizeof *v->z);
     uz_level_step up = v->step;
     up.coarse = v->room->x[1];
     uz_level_take_step(&up, UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
