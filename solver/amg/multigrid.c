@@ -245,29 +245,43 @@ static size_t count_bytes(const uz_aggregates *mg)
     return bytes + (mg->coarsest ? uz_factor_describe(mg->coarsest).bytes : 0);
 }
 
-/* M <= (D + L) D^-1 (D + L') for a cycle that smooths so, and for K itself; the norm of D^-1/2 L D^-1/2 is at most the
- * root of its largest row sum times its largest column sum. In any order of the dofs: all of K's entries count. */
-static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err)
+/* Sums of rows of D^-1/2 K D^-1/2 but for its diagonal, as the threads that share the columns see them; D^-1/2. */
+typedef struct {
+    const uz_csc *K;
+    double *row, *scale;
+} row_sums;
+
+static void add_columns(void *ctx, int64_t begin, int64_t end)
 {
-    double most = 0.0, *row = uz_alloc_zero(K->cols, sizeof *row), *scale = uz_alloc(K->cols, sizeof *scale);
-    const bool ok = row && scale;
-    for (int64_t j = 0; ok && j < K->cols; j++)
-        scale[j] = 1.0 / sqrt(K->val[K->ptr[j]]);
-    for (int64_t j = 0; ok && j < K->cols; j++) {
+    const row_sums *x = ctx;
+    const uz_csc *K = x->K;
+    const double *scale = x->scale;
+    for (int64_t j = begin; j < end; j++) {
         double own = 0.0;
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
             const int64_t i = K->idx[k];
             const double scaled = fabs(K->val[k]) * scale[j] * scale[i];
             own += scaled;
-            row[i] += scaled;
+            x->row[i] += scaled;
         }
-        row[j] += own;
+        x->row[j] += own;
     }
+}
+
+/* M <= (D + L) D^-1 (D + L') for a cycle that smooths so, and for K itself; the norm of D^-1/2 L D^-1/2 is at most the
+ * root of its largest row sum times its largest column sum. In any order of the dofs: all of K's entries count. */
+static uz_status bound_by_diagonal(double *bound, const uz_csc *K, uz_error *err)
+{
+    row_sums x = {K, uz_alloc_zero(K->cols, sizeof *x.row), uz_alloc(K->cols, sizeof *x.scale)};
+    const bool ok = x.row && x.scale;
     for (int64_t j = 0; ok && j < K->cols; j++)
-        most = fmax(most, row[j]);
+        x.scale[j] = 1.0 / sqrt(K->val[K->ptr[j]]);
+    if (ok)
+        uz_by_columns(add_columns, &x, K);
+    const double most = ok ? uz_long_max(K->cols, x.row) : 0.0;
     *bound = (1.0 + most) * (1.0 + most);
-    free(row);
-    free(scale);
+    free(x.row);
+    free(x.scale);
     return ok ? UZ_OK : fail_memory(K->cols, err);
 }
 
