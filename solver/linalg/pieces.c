@@ -162,16 +162,19 @@ double uz_long_dot(int64_t n, const double *x, const double *y)
 
 typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
 typedef double four __attribute__((vector_size(32)));
+enum { SUMS = 4 };
 
 static double find_dot_single(int64_t n, const void *x, const void *y)
 {
     const float *a = x, *b = y;
-    four lanes = {0.0};
+    four lanes[SUMS] = {{0.0}}; /* that wait for no other */
     int64_t j = 0;
-    for (; j + 4 <= n; j += 4)
-        lanes += __builtin_convertvector(*(const four_floats *)(a + j), four) *
-                 __builtin_convertvector(*(const four_floats *)(b + j), four);
-    double all = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    for (; j + 4 * SUMS <= n; j += 4 * SUMS)
+        for (int s = 0; s < SUMS; s++)
+            lanes[s] += __builtin_convertvector(*(const four_floats *)(a + j + 4 * s), four) *
+                        __builtin_convertvector(*(const four_floats *)(b + j + 4 * s), four);
+    const four all_lanes = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    double all = (all_lanes[0] + all_lanes[1]) + (all_lanes[2] + all_lanes[3]);
     for (; j < n; j++)
         all += (double)a[j] * (double)b[j];
     return all;
