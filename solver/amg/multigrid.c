@@ -5,6 +5,7 @@
 #include "amg/multigrid_private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "linalg/blas.h"
 #include "linalg/pieces.h"
 #include "core/error.h"
@@ -69,12 +70,13 @@ uz_status uz_level_round(uz_level *level, uz_error *err)
     return UZ_OK;
 }
 
-/* y = A x, b numbers for each node, of the rounded numbers. */
-static inline __attribute__((always_inline)) void multiply_rounded(double *y, const uz_level *level, const double *x,
-                                                                   int b)
+/* What nodes from `first` to `end` know of y = A x, after those that they have blocks with: b numbers for each node, of
+ * the rounded numbers. */
+static inline __attribute__((always_inline)) void multiply_rows(double *y, const uz_level *level, const double *x,
+                                                                int b, int64_t first, int64_t end)
 {
     const uz_blocks *A = &level->A;
-    for (int64_t i = 0; i < A->nodes; i++) {
+    for (int64_t i = first; i < end; i++) {
         const double *mine = x + i * b;
         double sum[UZ_MODES_MOST] = {0.0};
         for (int r = 0; r < b; r++)
@@ -97,9 +99,37 @@ static inline __attribute__((always_inline)) void multiply_rounded(double *y, co
     }
 }
 
-UZ_AVX2_FMA static void multiply_six_fused(double *y, const uz_level *level, const double *x)
+UZ_AVX2_FMA static void multiply_six_fused(double *y, const uz_level *level, const double *x, int64_t first,
+                                           int64_t end)
 {
-    multiply_rounded(y, level, x, 6);
+    multiply_rows(y, level, x, 6, first, end);
+}
+
+typedef struct {
+    double *y;
+    const uz_level *level;
+    const double *x;
+    const int64_t *first; /* of each part, and the end of the last */
+    int b;
+} rounded_product;
+
+static void multiply_part(void *ctx, int part)
+{
+    const rounded_product *p = ctx;
+    if (p->b == 6 && uz_cpu_has_avx2_fma())
+        multiply_six_fused(p->y, p->level, p->x, p->first[part], p->first[part + 1]);
+    else
+        multiply_rows(p->y, p->level, p->x, p->b, p->first[part], p->first[part + 1]);
+}
+
+static void multiply_rounded(double *y, const uz_level *level, const double *x, int b)
+{
+    const uz_blocks *A = &level->A;
+    const int64_t rest[] = {A->parts > 0 ? A->part[A->parts] : 0, A->nodes};
+    rounded_product p = {y, level, x, A->part, b};
+    uz_aside_share(multiply_part, &p, A->parts);
+    p.first = A->seams > 0 ? A->seam : rest;
+    uz_aside_share(multiply_part, &p, A->seams > 0 ? A->seams : 1);
 }
 
 /* y = A x roughly, vectors with `width` numbers for each node, the surplus ones 0: four where uz_blocks_multiply takes
@@ -111,8 +141,6 @@ static void multiply(double *y, const uz_level *level, const double *x, int widt
         uz_blocks_multiply(y, A, x, 1);
     else if (width == 4)
         uz_level_multiply_parts(y, level, x, 1);
-    else if (width == 6 && uz_cpu_has_avx2_fma())
-        multiply_six_fused(y, level, x);
     else
         multiply_rounded(y, level, x, width);
 }
