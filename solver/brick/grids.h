@@ -11,7 +11,8 @@ typedef struct {
     double block[9 * UZ_BRICK_PARITIES]; /* of the first one, in double precision, unit 1 */
     uz_brick_level level[UZ_BRICK_LEVELS_MOST];
     float *inverse[UZ_BRICK_LEVELS_MOST];
-    double *coarsest; /* the factor of the last grid's K, n x n */
+    double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS]; /* of a cell of the last one */
+    double *coarsest;                         /* the factor of its K, n x n */
     int64_t n_coarsest;
 } uz_brick_grids;
 

@@ -58,9 +58,10 @@ static bool stiffness_of(double *ke, const uz_brick *brick, const uz_brick_level
     return true;
 }
 
-static bool init_level(uz_brick_level *level, const uz_brick *brick, double unit, const bool coarser[3])
+/* ke: of its cells. */
+static bool init_level(uz_brick_level *level, double *ke, const uz_brick *brick, double unit, const bool coarser[3])
 {
-    double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], block[9 * UZ_BRICK_PARITIES];
+    double block[9 * UZ_BRICK_PARITIES];
     level->stride = uz_brick_stride(level->cells[0]);
     /* what is read beyond its last line, and counts for nothing, is not of the next plane, which another thread may
      * have */
@@ -106,7 +107,7 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
         int64_t next[3];
         const bool last = !coarsen(next, level) || l + 1 == UZ_BRICK_LEVELS_MOST;
         const bool coarser[3] = {next[0] < level->cells[0], next[1] < level->cells[1], next[2] < level->cells[2]};
-        *sound = *sound && init_level(level, brick, mg->unit, coarser);
+        *sound = *sound && init_level(level, mg->ke, brick, mg->unit, coarser);
         mg->base.levels = l + 1;
         if (!*sound || last)
             return true;
@@ -191,13 +192,12 @@ uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const
                                    uz_error *err)
 {
     const uz_brick_level *level = &mg->level[mg->base.levels - 1];
-    double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS];
     const int64_t n = mg->n_coarsest, nx = level->cells[0] + 1, ny = level->cells[1] + 1, nodes = n / 3;
     int64_t *place = uz_alloc(n, sizeof *place);
     double *A = uz_alloc_zero(n * n, sizeof *A);
     uz_status status = UZ_OK;
     *out = NULL;
-    if (!place || !A || !stiffness_of(ke, mg->brick, level)) {
+    if (!place || !A) {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
         goto done;
     }
@@ -211,7 +211,7 @@ uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const
                         const int64_t at = row % 3 * nodes + ((k + a[2]) * ny + j + a[1]) * nx + i + a[0],
                                       from = column % 3 * nodes + ((k + b[2]) * ny + j + b[1]) * nx + i + b[0];
                         if (inverse[place[at]] != 0.0F && inverse[place[from]] != 0.0F)
-                            A[from * n + at] += ke[row * UZ_BRICK_DOFS + column] / mg->unit;
+                            A[from * n + at] += mg->ke[row * UZ_BRICK_DOFS + column] / mg->unit;
                     }
     for (int64_t i = 0; i < n; i++)
         if (inverse[place[i]] == 0.0F)
