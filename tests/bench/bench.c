@@ -511,11 +511,11 @@ int main(int argc, char **argv)
         fprintf(out.json, "}\n");
         return fclose(out.json) != 0;
     }
-    if (out.filter && strcmp(out.filter, "cycles") == 0) {
+    if (out.filter && (strcmp(out.filter, "cycles") == 0 || strcmp(out.filter, "roof") == 0)) {
         fprintf(out.json, "{");
-        const bool solved = bench_cycles(out.json);
+        const bool measured = (out.filter[0] == 'c' ? bench_cycles : bench_roof)(out.json);
         fprintf(out.json, "}\n");
-        return fclose(out.json) != 0 || !solved;
+        return fclose(out.json) != 0 || !measured;
     }
     if (out.filter && strcmp(out.filter, "predictions") == 0) {
         fprintf(out.json, "{");

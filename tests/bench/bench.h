@@ -80,6 +80,9 @@ bool bench_cells(bench_cells_row *row, int64_t n);
 /* Conjugate gradients to 1e-8 on boxes of equal cells, from 16 to 96 along a side and of cells 10 times as long and as
  * short along one axis: their numbers, printed and as a member of a JSON object. false: one is not solved. */
 bool bench_cycles(FILE *json);
+/* What two threads do over what one does, of arithmetic and of reads: printed and as a member of a JSON object. false:
+ * no memory. */
+bool bench_roof(FILE *json);
 /* Bodies of every kind: seconds and bytes that were predicted, and what their solves took, printed and as a member of a
  * JSON object. filter: part of an element's name, NULL: all. false: one is not solved. Minutes, and 3 GB. */
 bool bench_predictions(FILE *json, const char *filter);

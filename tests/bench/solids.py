@@ -3,9 +3,11 @@ usage: solids.py BUILD_DIR OUTPUT.json [CELLS=32] [RUNS=3]
 
 The cube of tests/peers/gamg.py with CELLS cells along a side: as a box of equal hex8, whose K is no matrix, and as hex8
 whose inner nodes were moved; seconds of processor of a daemon at its defaults, in one thread, from request to answer,
-certified to 1e-6. Ratios are of runs one after the other, medians of RUNS; many cases are run once. Iterations of conjugate gradients on boxes are
-counted by BUILD_DIR/bench."""
+certified to 1e-6. Ratios are of runs one after the other, medians of RUNS; many cases are run once. What two threads spare is measured by the clock, and says
+something on a machine that does nothing else. Iterations of conjugate gradients on boxes are counted by BUILD_DIR/bench, which also measures what two
+threads can do here at most."""
 import copy
+import itertools
 import json
 import math
 import pathlib
@@ -13,6 +15,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 
 import numpy
 
@@ -104,19 +107,45 @@ def ratios(build, n, runs):
         yield {"what": f"{CASES} load cases", "mesh": kind, "unknowns": summary["problem"]["d"], "target": target, "unit": "s", "cold": seconds, "cached": None, "operator": summary["operator"]}
 
 
-def count_cycles(build):
+def clocks(build, threads, asked):
+    """Seconds by the clock of a body that is new and of another load on it, by so many threads."""
+    s = service.Service(build, "--workers", "1", "--threads", str(threads))
+    seconds = []
+    try:
+        s.start()
+        for factor in (1.0, 1.03):
+            s.settle()
+            loads = [{**load, "traction": [factor * t for t in load["traction"]]} for load in asked["problem"]["loads"]]
+            begin = time.monotonic()
+            job = cubes.answer(s, {**asked, "problem": {**asked["problem"], "loads": loads}})
+            seconds.append(time.monotonic() - begin)
+        return (*seconds, job["summary"])
+    finally:
+        s.stop()
+
+
+def speedups(build, n, runs):
+    nodes, elements, faces = cubes.mesh("hex8", n)
+    for kind, target in (("box", 1.7), ("hex8", 1.4)):
+        asked = cubes.request(kind, n, nodes, elements, faces)
+        pairs = [(clocks(build, 1, asked), clocks(build, 2, asked)) for _ in range(runs)]
+        cold, cached = (statistics.median(one[k] / two[k] for one, two in pairs) for k in (0, 1))
+        yield {"what": "one thread over two, by the clock", "mesh": kind, "unknowns": pairs[0][1][2]["problem"]["d"], "target": target, "unit": "", "cold": cold, "cached": cached, "operator": pairs[0][1][2]["operator"]}
+
+
+def by_bench(build, what):
     with tempfile.TemporaryDirectory() as folder:
-        out = pathlib.Path(folder) / "cycles.json"
-        subprocess.run([f"{build}/bench", str(out), "cycles"], check=True)
-        return json.loads(out.read_text(encoding="utf-8"))["boxes"]
+        out = pathlib.Path(folder) / f"{what}.json"
+        subprocess.run([f"{build}/bench", str(out), what], check=True)
+        return json.loads(out.read_text(encoding="utf-8"))
 
 
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     given = {"CELLS": 32, "RUNS": 3, **{key: int(value) for key, value in (word.split("=") for word in sys.argv[3:])}}
-    found = {"runs": given["RUNS"], "boxes": count_cycles(sys.argv[1]), "rows": []}
-    for row in ratios(sys.argv[1], given["CELLS"], given["RUNS"]):
+    found = {"runs": given["RUNS"], **by_bench(sys.argv[1], "cycles"), **by_bench(sys.argv[1], "roof"), "rows": []}
+    for row in itertools.chain(ratios(sys.argv[1], given["CELLS"], given["RUNS"]), speedups(sys.argv[1], given["CELLS"], given["RUNS"])):
         print(f"{row['what']:34s} {row['mesh']:6s} {row['unknowns']:8d} {row['cold']:8.2f} {row['cached'] or math.nan:8.2f}  (target {row['target']}) {row['operator']}", flush=True)
         found["rows"].append(row)
     pathlib.Path(sys.argv[2]).write_text(json.dumps(found), encoding="utf-8")

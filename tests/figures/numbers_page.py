@@ -266,7 +266,7 @@ def page(data, files):
     add("Solids over one multigrid solve", timed(tables.space(data), data, "peers_space", "rows"), SPACE)
     add("Large deformation against other programs", tables.peers_large(data), PEERS_LARGE)
     add("Bodies that slide under large deformation", tables.large_solids(data), LARGE_SOLIDS)
-    add("Solids without a factor", timed([*tables.cycles(data), "", *tables.shapes(data), "", *tables.runs_of_shapes(data)] if "bench_solids" in data else None, data, "bench_solids"), CYCLES, SHAPES)
+    add("Solids without a factor", timed([*tables.cycles(data), "", *tables.shapes(data), "", *tables.runs_of_shapes(data), *tables.roof(data)] if "bench_solids" in data else None, data, "bench_solids"), CYCLES, SHAPES)
     add("Predicted and actual", timed(tables.predictions(data), data, "bench_predictions"), PREDICTIONS)
     add("What the whole error costs", timed(tables.trade(data), data, "trade", "rows"), TRADE)
     add("A contact force within 2 %", tables.forces(data), FORCES)

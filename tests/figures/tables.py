@@ -477,6 +477,13 @@ def predictions(data):
     return found and table(["body", "special", "unknowns", "operator", *(f"{what} ({count})" for what, count in zip(("cold", "another load", "bytes"), within)), "over the one chosen"], rows)
 
 
+def roof(data):
+    """What two threads of the machine do over what one does."""
+    found = data["bench_solids"].get("roof")
+    told = found and ", ".join(f"{row['ratio']:.2f} of {'reads of ' + str(row['read_mb']) + ' MB each' if row['read_mb'] else 'arithmetic'}" for row in found)
+    return [f"Two threads of this machine do at most so many times what one does: {told}."] if found else []
+
+
 def runs_of_shapes(data):
     runs = data["bench_solids"]["runs"]
     return [f"Ratios are medians of {runs} runs." if runs > 1 else "Ratios are of single runs."]
