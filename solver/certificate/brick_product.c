@@ -33,16 +33,18 @@ typedef struct {
     planes of[UZ_ASIDE_MOST];
 } whole;
 
-/* Planes of a slab at least: what lies below it is computed once more. */
-enum { SLAB_LEAST = 4 };
+/* Planes of a slab at least: what lies below it is computed once more. Slabs for each thread that there is, as one of
+ * them may have a task when the others begin: by two threads both end within half a slab of each other. */
+enum { SLAB_LEAST = 4, SLABS_OF_THREAD = 2 };
 
 static bool make(whole *w, const uz_brick *brick)
 {
     const int64_t most = (brick->cells[2] + 1) / SLAB_LEAST;
-    const int threads = most < 2 ? 1 : uz_aside_threads();
+    const int threads = uz_aside_count(), wanted = threads < 2 ? 1 : SLABS_OF_THREAD * threads,
+              slabs = wanted < UZ_ASIDE_MOST ? wanted : UZ_ASIDE_MOST;
     *w = (whole){.brick = brick, .stride = (brick->cells[0] / LANES + 2) * LANES};
     w->plane = w->stride * (brick->cells[1] + 1);
-    w->slabs = threads < most ? threads : most < 2 ? 1 : (int)most;
+    w->slabs = slabs < most ? slabs : most < 2 ? 1 : (int)most;
     bool ok = true;
     for (int slab = 0; slab < w->slabs; slab++)
         for (int k = 0; k < 2; k++) {

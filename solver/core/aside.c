@@ -93,7 +93,9 @@ static void wait_for_all(void)
 
 void uz_aside_share(void (*run)(void *ctx, int part), void *ctx, int parts)
 {
-    const int threads = uz_aside_threads(), most = threads < parts ? threads : parts;
+    const int count = uz_aside_count(), allowed = atomic_load(&aside.allowed),
+              threads = allowed < count ? allowed : count,
+              most = threads < parts ? threads : parts; /* one that has a task comes when that has ended */
     bool shared = false;
     if (most < 2 || !atomic_compare_exchange_strong(&aside.shared, &shared, true)) {
         for (int part = 0; part < parts; part++)

@@ -37,8 +37,9 @@ int uz_aside_threads(void);
 int uz_aside_count(void);
 /* Threads that shares since the last call had, at most: 1 where there was none. */
 int uz_aside_used(void);
-/* Calls run(ctx, part) for every part from 0 to parts - 1, some of them on other threads, and comes back after all.
- * Parts must not wait for each other: what a thread has not begun, the caller does. */
+/* Calls run(ctx, part) for every part from 0 to parts - 1, some of them on other threads, one that has a task as soon
+ * as that has ended, and comes back after all. Parts must not wait for each other: what a thread has not begun, the
+ * caller does. */
 void uz_aside_share(void (*run)(void *ctx, int part), void *ctx, int parts);
 
 #endif

@@ -50,6 +50,46 @@ TEST(a_task_runs_once_on_the_other_thread_or_never)
     CHECK(!uz_aside_is_idle() && !uz_aside_start(&b));
 }
 
+typedef struct {
+    atomic_bool runs, may_end, alone;
+    atomic_int begun;
+} busy;
+
+static void wait_in_task(void *ctx)
+{
+    busy *b = ctx;
+    atomic_store(&b->runs, true);
+    while (!atomic_load(&b->may_end))
+        nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
+}
+
+static void wait_for_other(void *ctx, int part)
+{
+    busy *b = ctx;
+    (void)part;
+    atomic_fetch_add(&b->begun, 1);
+    atomic_store(&b->may_end, true);
+    for (int k = 0; k < 60000 && atomic_load(&b->begun) < 2; k++)
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    if (atomic_load(&b->begun) < 2)
+        atomic_store(&b->alone, true);
+}
+
+TEST(a_thread_that_has_a_task_comes_when_that_has_ended)
+{
+    busy b = {.begun = 0};
+    uz_aside_task task = {.run = wait_in_task, .ctx = &b};
+    CHECK_INT(uz_aside_begin(2), 2); /* no third one takes the part */
+    uz_aside_allow(2);
+    CHECK(uz_aside_start(&task));
+    while (!atomic_load(&b.runs))
+        nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
+    uz_aside_share(wait_for_other, &b, 2);
+    CHECK(atomic_load(&b.begun) == 2 && !atomic_load(&b.alone));
+    CHECK(uz_aside_finish(&task));
+    uz_aside_allow(1);
+}
+
 enum { PARTS = 4, SHARES = 20000 };
 
 typedef struct {
