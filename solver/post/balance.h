@@ -50,8 +50,8 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
 double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small);
-/* Warns that there was no memory to find out; the answer has its measure (uz_evaluation.nonlinear). */
-void uz_doubt_uncompared(uz_evaluation *out);
+/* Warns that there was no `lacked` (memory, time) to find out; the answer has its measure (uz_evaluation.nonlinear). */
+void uz_doubt_uncompared(uz_evaluation *out, const char *lacked);
 /* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.
  */
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene);

@@ -241,12 +241,12 @@ void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
              small->load);
 }
 
-void uz_doubt_uncompared(uz_evaluation *out)
+void uz_doubt_uncompared(uz_evaluation *out, const char *lacked)
 {
     warn(out, "large_deformation", out->nonlinear,
-         "small deformation leaves out some %.2g %% of the forces, and there was no memory to compare it with large "
+         "small deformation leaves out some %.2g %% of the forces, and there was no %s to compare it with large "
          "deformation: use a coarser mesh to find out",
-         100 * out->nonlinear);
+         100 * out->nonlinear, lacked);
 }
 
 /* ---- contact */

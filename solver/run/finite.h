@@ -219,6 +219,8 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
 
 /* *out: the answer run->at under run->load. why: of the part beyond it that was tried last, `tried`. */
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err);
+/* Why a part was UZ_PART_STOPPED: the beginning of a sentence. */
+const char *uz_explain_stop(uz_outcome stopped);
 /* What a run holds, beside the largest of what its contact problems and its certificates take. rows: a body moved to a
  * place, NULL: not there yet. */
 double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, bool pairs);

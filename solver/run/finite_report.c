@@ -22,6 +22,13 @@
 /* What equations may have of the mesh's error in a balanced answer. */
 #define OF_MESH 0.1
 
+const char *uz_explain_stop(uz_outcome stopped)
+{
+    return stopped == UZ_DISMISSED    ? "stopped by request"
+           : stopped == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
+                                      : "the iterations allowed were used up: raise max_iterations";
+}
+
 static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double tried)
 {
     const double load = s->finite.load;
@@ -69,11 +76,7 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
             tried, of, load);
         break;
     case UZ_PART_STOPPED:
-        snprintf(text, size, "%s: this is the answer under %.6g of %s",
-                 run->stopped == UZ_DISMISSED    ? "stopped by request"
-                 : run->stopped == UZ_TIME_LIMIT ? "the time allowed was used up: raise time_limit_s"
-                                                 : "the iterations allowed were used up: raise max_iterations",
-                 load, of);
+        snprintf(text, size, "%s: this is the answer under %.6g of %s", uz_explain_stop(run->stopped), load, of);
         break;
     default:
         snprintf(text, size,
@@ -222,6 +225,8 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
         result->summary = run->last->summary;
     else if (run->from)
         result->summary = run->from->last;
+    else
+        result->summary.row_scaling = UZ_ROW_SCALING_NONE; /* no step was taken */
     summarize(&result->summary, run, why, tried);
     double *bytes = &result->summary.cost.actual_bytes;
     *bytes = fmax(*bytes, run->certificate.bytes) + uz_finite_bytes(&run->base, &run->at.rows, run->pairs);

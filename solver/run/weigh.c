@@ -11,6 +11,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 #include "post/balance.h"
 #include "run/problem.h"
 #include "run/settings.h"
@@ -69,6 +70,27 @@ static void count_both(uz_summary *told, const uz_summary *other)
     told->cost.actual_bytes += other->cost.actual_bytes;
 }
 
+/* Large deformation was ended on its way to the whole load: it tells nothing of small deformation. */
+static bool is_stopped(const uz_summary *large)
+{
+    return large->finite.load < 1 &&
+           (large->outcome == UZ_TIME_LIMIT || large->outcome == UZ_DISMISSED || large->outcome == UZ_ITERATION_LIMIT);
+}
+
+/* The answer of small deformation is under the whole load, and stays in place of one under a part of it. large: NULL
+ * where there is not even that. */
+static void keep_small(uz_result *small, const uz_result *large, const uz_hooks *hooks)
+{
+    uz_summary *s = &small->summary;
+    s->outcome = large ? large->summary.outcome : uz_cancelled(hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+    snprintf(s->message, sizeof s->message,
+             "%s: large deformation had come to %.6g of the load, and this is the answer of small deformation, under "
+             "all of it",
+             uz_explain_stop(s->outcome), large ? large->summary.finite.load : 0.0);
+    if (large)
+        count_both(s, &large->summary);
+}
+
 /* Of the linear law: by what it is in the strain of Green and Lagrange. */
 static uz_status compare_linear(uz_result *result, const uz_problem *one, const uz_hooks *hooks, double deadline,
                                 uz_error *err)
@@ -90,8 +112,8 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
     coarse.relative_error = COMPARED_TO;
     const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, NULL, &own);
     free(by_law.scene.materials);
-    if (status == UZ_ERR_MEMORY) { /* what is left is an answer */
-        uz_doubt_uncompared(result->evaluation);
+    if (status == UZ_ERR_MEMORY || status == UZ_ERR_CANCELLED) { /* what is left is an answer */
+        uz_doubt_uncompared(result->evaluation, status == UZ_ERR_MEMORY ? "memory" : "time");
         return UZ_OK;
     }
     if (status == UZ_ERR_INTERNAL) {
@@ -108,6 +130,8 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
         result->summary.small = large->summary.small;
     if (ended && !(large->summary.small.error <= TOLERABLE))
         uz_doubt_deformation(result->evaluation, &large->summary.small);
+    if (is_stopped(&large->summary))
+        uz_doubt_uncompared(result->evaluation, "time");
     uz_result_free(large);
     return UZ_OK;
 }
@@ -125,11 +149,18 @@ static uz_status refuse_free(const uz_result *small, const uz_error *own, uz_err
         own->message);
 }
 
-static uz_status solve_large(uz_result **large, const uz_result *small, const uz_problem *finite,
-                             const uz_settings *settings, const uz_hooks *hooks, double deadline, uz_error *err)
+/* *large NULL: it was stopped, and the answer of small deformation stays. */
+static uz_status solve_large(uz_result **large, uz_result *small, const uz_problem *finite, const uz_settings *settings,
+                             const uz_hooks *hooks, double deadline, uz_error *err)
 {
     uz_error own = {0};
     const uz_status status = uz_solve_finite_load(large, finite, settings, hooks, deadline, small, NULL, &own);
+    if (status == UZ_ERR_CANCELLED || (status == UZ_OK && is_stopped(&(*large)->summary))) {
+        keep_small(small, *large, hooks);
+        uz_result_free(*large);
+        *large = NULL;
+        return UZ_OK;
+    }
     if (status == UZ_ERR_FREE_BODY)
         return refuse_free(small, &own, err);
     if (status != UZ_OK && err)
@@ -144,7 +175,7 @@ static uz_status choose(uz_result **result, const uz_problem *one, const uz_sett
     uz_result *large = NULL, *left;
     finite.scene.kinematics = UZ_KINEMATICS_FINITE;
     const uz_status status = solve_large(&large, *result, &finite, settings, hooks, deadline, err);
-    if (status != UZ_OK)
+    if (status != UZ_OK || !large)
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;
     left = enough ? *result : large;
@@ -181,8 +212,8 @@ bool uz_is_weighed(const uz_problem *problem)
 }
 
 /* Of a case whose mesh was chosen for small deformation: what that errs by there; *compared: false where that is
- * surely little. */
-static uz_status weigh_chosen(uz_small *small, bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
+ * surely little, or where there was no time to. */
+static uz_status weigh_chosen(bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
                               const uz_hooks *hooks, double deadline, uz_error *err)
 {
     uz_problem one = uz_problem_of_case(problem, i);
@@ -202,12 +233,28 @@ static uz_status weigh_chosen(uz_small *small, bool *compared, uz_result *result
     one.n_quantities = 0;
     coarse.relative_error = COMPARED_TO;
     const uz_status status = solve_large(&large, result, &one, &coarse, hooks, deadline, err);
-    if (status != UZ_OK)
+    *compared = large != NULL;
+    if (status != UZ_OK || !large)
         return status;
-    *small = large->summary.small;
+    result->summary.small = large->summary.small;
     count_both(&result->summary, &large->summary);
     uz_result_free(large);
     return UZ_OK;
+}
+
+/* *large, of a mesh that was chosen for it, gets what is known of small deformation, or gives way to it where it was
+ * stopped. */
+static void choose_meshed(uz_result **large, uz_result **small, const uz_hooks *hooks)
+{
+    uz_result *found = *large;
+    if (!found || is_stopped(&found->summary)) {
+        keep_small(*small, found, hooks);
+        *large = *small;
+        *small = found;
+        return;
+    }
+    found->summary.small = (*small)->summary.small;
+    uz_timings_add(&found->summary.timings, &(*small)->summary.timings);
 }
 
 /* On a mesh that is chosen for small deformation; where that is not enough, for one of the cases, on another one, that
@@ -217,37 +264,35 @@ static uz_status solve_chosen(uz_result **results, const uz_problem *problem, co
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
-    uz_small *small = uz_alloc_zero(n, sizeof *small);
-    uz_timings *spent = uz_alloc_zero(n, sizeof *spent);
+    uz_result **kept = uz_alloc_zero(n, sizeof *kept); /* answers of small deformation, until there are others */
     bool enough = true;
-    uz_status status = small && spent ? uz_solve_grid_sequence(results, problem, settings, starts, cache, hooks, err)
-                                      : uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for %lld cases", (long long)n);
+    uz_status status = kept ? uz_solve_grid_sequence(results, problem, settings, starts, cache, hooks, err)
+                            : uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for %lld cases", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         bool compared;
-        status = weigh_chosen(&small[i], &compared, results[i], problem, i, hooks, deadline, err);
+        status = weigh_chosen(&compared, results[i], problem, i, hooks, deadline, err);
         if (status != UZ_OK && problem->n_cases > 0)
             uz_error_name_case(err, problem, i);
-        enough = enough && (!compared || small[i].error <= TOLERABLE);
-        spent[i] = results[i]->summary.timings;
+        enough = enough && (!compared || results[i]->summary.small.error <= TOLERABLE);
     }
     if (status == UZ_OK && !enough) {
         uz_problem large = *problem;
         uz_settings rest = *settings;
         large.scene.kinematics = UZ_KINEMATICS_FINITE;
         rest.time_limit_s = fmax(0.0, deadline - uz_seconds());
-        for (int64_t i = 0; i < n; i++) {
-            uz_result_free(results[i]);
-            results[i] = NULL;
-        }
+        memcpy(kept, results, (size_t)n * sizeof *kept);
+        memset(results, 0, (size_t)n * sizeof *results);
         status = uz_solve_grid_sequence(results, &large, &rest, NULL, cache, hooks, err);
+        if (status == UZ_ERR_CANCELLED) {
+            uz_error_reset(err);
+            status = UZ_OK;
+        }
+        for (int64_t i = 0; i < n && status == UZ_OK; i++)
+            choose_meshed(&results[i], &kept[i], hooks);
     }
-    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        results[i]->summary.small = small[i];
-        if (!enough)
-            uz_timings_add(&results[i]->summary.timings, &spent[i]);
-    }
-    free(small);
-    free(spent);
+    for (int64_t i = 0; i < n && kept; i++)
+        uz_result_free(kept[i]);
+    free(kept);
     return status;
 }
 

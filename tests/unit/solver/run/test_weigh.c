@@ -626,6 +626,53 @@ TEST(a_free_body_that_slides_is_refused_for_that)
     uz_scene_clear(&s);
 }
 
+static bool stop_now(void *ctx)
+{
+    int *left = ctx;
+    return (*left)-- <= 0;
+}
+
+/* Cancelled at every point there is. Large deformation was told under 0 of the load, in place of an answer under all.
+ */
+TEST(what_is_stopped_tells_the_answer_that_there_is)
+{
+    for (int k = 0; k < 3; k++) { /* a mesh that is given, one that is refined, and the linear law */
+        int kept = 0, whole = 0;
+        for (int questions = 0; whole == 0; questions += 1 + questions / 20) {
+            uz_scene s = block("tri6", 10, 1, 10, 2);
+            s.materials[0].young = 100;
+            s.materials[0].law = k < 2 ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_LINEAR;
+            s.refine = k == 1;
+            body_hold(&s, "left", 0, 0, NAN);
+            body_load(&s, UZ_LOAD_TRACTION, "right", 0, 0.3, 0);
+            body_plane(&s, "top", (double[3]){0, 3, 0}, (double[3]){0, -1, 0});
+            int left = questions;
+            const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+            const uz_hooks hooks = {.ctx = &left, .cancelled = stop_now};
+            uz_settings settings = uz_settings_default();
+            uz_result *result = NULL;
+            uz_error err = {0};
+            settings.relative_error = 1e-2;
+            const uz_status status = uz_solve(&result, &problem, &settings, NULL, &hooks, &err);
+            CHECK(status == UZ_OK || status == UZ_ERR_CANCELLED);
+            if (result) {
+                const uz_summary *told = &result->summary;
+                const bool large = told->geometry.kind == UZ_KINEMATICS_FINITE;
+                CHECK_MSG(!large || told->finite.load == 1, "%g of the load: %s", told->finite.load, told->message);
+                CHECK(told->row_scaling != UZ_ROW_SCALING_AUTO);
+                whole = told->outcome == UZ_CONVERGED && told->small.compared;
+                const uz_warning *lacking = warning(result, "large_deformation");
+                kept += k < 2 ? strstr(told->message, "answer of small deformation") != NULL
+                              : !whole && lacking && strstr(lacking->message, "no time");
+                CHECK(told->outcome != UZ_CONVERGED || whole || lacking);
+            }
+            uz_result_free(result);
+            uz_scene_clear(&s);
+        }
+        CHECK_MSG(kept > 0, "%d", k);
+    }
+}
+
 TEST(what_a_comparison_takes_is_counted)
 {
     uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){12, 12, 12});
