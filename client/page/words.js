@@ -32,6 +32,7 @@ const OUTCOMES = {
   infeasible: ["bad", "Infeasible", "No displacement satisfies all contact conditions: supports and obstacles contradict each other."],
   out_of_reach: ["bad", "Out of reach", "Contact conditions contradict each other but for rounding: a displacement that meets them all, if there is one, is far away."],
   loose: ["warn", "Loose", "No load presses the body on what would hold it: where the obstacles leave it room it may lie anywhere, and this is one such place."],
+  unheld: ["bad", "Not held", "The load does not press the body on the obstacles that alone hold it: this case has no answer."],
   moving_geometry: ["warn", "Geometry not settled", "The surfaces move so far that gaps and normals, taken where the answer moves them to, did not settle. This is the last answer."],
   unstable: ["bad", "Unstable", "Beyond a part of the load no stable equilibrium was found: a limit load or a bifurcation. This is the answer under that part."],
   inverted: ["bad", "Inverted", "Beyond a part of the load elements turn inside out. This is the answer under that part."],
@@ -46,7 +47,7 @@ export function outcome_words(summary) {
 }
 
 function has_no_answer(summary) {
-  return summary.outcome === "infeasible" || summary.outcome === "out_of_reach";
+  return ["infeasible", "out_of_reach", "unheld"].includes(summary.outcome);
 }
 
 function bound_of(summary) {

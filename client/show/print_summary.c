@@ -97,6 +97,7 @@ static void print_outcome(FILE *to, const json_t *summary)
         {"unstable", "no stable equilibrium was found under all of the load; this is the answer under a part of it"},
         {"inverted", "elements turn inside out under all of the load; this is the answer under a part of it"},
         {"loose", "nothing says where the body lies; this is one place of many"},
+        {"unheld", "the load does not press the body on what would hold it; there is no answer"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
         {"verified", "the certificate of the given answer meets what was asked for"},
         {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},

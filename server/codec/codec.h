@@ -134,7 +134,7 @@ bool codec_summary_read(json_tree *out, const char *json);
 const char *codec_summary_text(const json_value *summary, const char *name);
 
 /* How many cases of a job ended in each way. */
-#define CODEC_OUTCOMES (UZ_INVERTED + 1)
+#define CODEC_OUTCOMES (UZ_UNHELD + 1)
 typedef struct {
     int64_t count, outcomes[CODEC_OUTCOMES];
     const char *worst; /* name */

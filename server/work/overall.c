@@ -10,7 +10,7 @@ static const int BADNESS[] = {
     [UZ_CONVERGED] = 0,   [UZ_VERIFIED] = 0,        [UZ_PRECISION_LIMIT] = 1, [UZ_MESH_LIMIT] = 2,
     [UZ_PAPER_RULE] = 3,  [UZ_ITERATION_LIMIT] = 4, [UZ_MOVING_GEOMETRY] = 5, [UZ_NOT_VERIFIED] = 6,
     [UZ_TIME_LIMIT] = 7,  [UZ_DISMISSED] = 8,       [UZ_LOOSE] = 9,           [UZ_OUT_OF_REACH] = 10,
-    [UZ_INFEASIBLE] = 11, [UZ_INVERTED] = 12,       [UZ_UNSTABLE] = 13};
+    [UZ_INFEASIBLE] = 11, [UZ_INVERTED] = 12,       [UZ_UNSTABLE] = 13,       [UZ_UNHELD] = 14};
 _Static_assert(sizeof BADNESS / sizeof BADNESS[0] == CODEC_OUTCOMES, "each outcome has its place");
 
 void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *results, const uz_problem *problem)

@@ -30,7 +30,9 @@ typedef enum {
                          */
     UZ_UNSTABLE, /* finite: no stable equilibrium was reached under the whole load; the answer is that of the last part
                   * of it that has one (uz_finite.load) */
-    UZ_INVERTED  /* finite: likewise, where beyond that part elements turn inside out */
+    UZ_INVERTED, /* finite: likewise, where beyond that part elements turn inside out */
+    UZ_UNHELD    /* semicoercive, one of several load cases: its load pushes the body away from what would hold it, or
+                  * along what nothing holds, and there is no answer; alone it is refused (UZ_ERR_FREE_BODY) */
 } uz_outcome;
 
 /* KKT residual of the paper, section 4: e1 = Ku - p - N'r, e2 = min(g, 0), e3 = max(r, 0), e4 = -g.r; 2-norms. */

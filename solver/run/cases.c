@@ -41,6 +41,8 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     uz_status status = rounds;
+    int64_t unheld = 0;
+    uz_error first = {0};             /* why the first of these is */
     for (int64_t i = 0; i < n; i++) { /* those refused or not certified, because only the obstacle holds the body */
         uz_problem one = uz_problem_of_case(problem, i);
         if (!uz_may_be_semicoercive(rounds, results[i], &one, settings))
@@ -57,6 +59,17 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
         status = starts && starts[i] ? check_start(starts[i], &one, err) : UZ_OK;
         if (status == UZ_OK)
             status = uz_solve_semicoercive(&results[i], &one, settings, cache, hooks, rounds, started, err);
+        if (status == UZ_ERR_FREE_BODY && results[i] && results[i]->summary.outcome == UZ_UNHELD) {
+            name_case(err, problem, i);
+            if (unheld++ == 0 && err)
+                first = *err;
+            if (unheld == n && err)
+                *err = first;
+            if (unheld == n)
+                break;
+            uz_error_reset(err); /* others may have an answer */
+            status = UZ_OK;
+        }
         if (status == UZ_OK)
             continue;
         name_case(err, problem, i);

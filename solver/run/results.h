@@ -9,7 +9,7 @@
 
 static inline bool uz_has_no_answer(const uz_summary *s)
 {
-    return s->outcome == UZ_INFEASIBLE || s->outcome == UZ_OUT_OF_REACH;
+    return s->outcome == UZ_INFEASIBLE || s->outcome == UZ_OUT_OF_REACH || s->outcome == UZ_UNHELD;
 }
 /* Of the free dofs u (d; may be result->u) of an answer with m rows: displacements by node, mesh, forces, pressures.
  * ahead: as uz_evaluate takes it. Errors: UZ_ERR_MEMORY. */

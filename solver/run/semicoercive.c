@@ -382,6 +382,14 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
         status = run_rounds(&s, &own);
     if (status == UZ_OK)
         status = uz_semi_conclude(&s, &own);
+    if (status == UZ_ERR_FREE_BODY && !*out && s.m > 0) {
+        uz_error why = own;
+        const uz_status refused_with = uz_semi_refuse(out, &s, &why, &own);
+        if (refused_with == UZ_OK)
+            own = why;
+        else
+            status = refused_with;
+    }
     bool better =
         !*out || (s.last && s.last->summary.certificate.relative_error < (*out)->summary.certificate.relative_error);
     if (status == UZ_OK && better) {

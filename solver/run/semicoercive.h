@@ -20,7 +20,8 @@ bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz
 
 /* As uz_solve; started: uz_seconds() of its begin, from which the time limit counts. *err holds the refusal of the
  * ordinary way; it stays where this way has nothing better to say: K is not even semidefinite, or rows don't reach its
- * null space. UZ_ERR_FREE_BODY names the motion that the load does not press on. */
+ * null space. UZ_ERR_FREE_BODY names the motion that the load does not press on; *out may then be
+ * a result that says so in place of an answer (UZ_UNHELD). */
 uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, const uz_settings *settings,
                                 uz_cache *cache, const uz_hooks *hooks, uz_status refused, double started,
                                 uz_error *err);

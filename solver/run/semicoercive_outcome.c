@@ -14,6 +14,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The null space of matrices is known by iterations on a factor: its rounding allows no more. */
 #define BALANCED 1e-7
@@ -222,6 +223,22 @@ static uz_status find_quantities(uz_semi *s, uz_error *err)
     return status;
 }
 
+/* Bounds of iterations were about regularized problems; that of the certificate alone is about this one. */
+static void count_times(uz_result *result, const uz_semi *s)
+{
+    uz_summary *summary = &result->summary;
+    uz_milestones milestones;
+    summary->timings.assemble += s->assemble_s;
+    summary->timings.total = uz_seconds() - s->started;
+    uz_milestones_init(&milestones, false);
+    uz_milestones_resume(&milestones, summary->timings.total);
+    uz_milestones_pause(&milestones);
+    uz_milestones_note(&milestones, UZ_MILESTONE_OF_CERTIFICATE, summary->certificate.relative_error,
+                       summary->iterations, 0);
+    result->trade = milestones.trade;
+    result->trade.total_s = milestones.trade.iterated_s;
+}
+
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
@@ -263,16 +280,40 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
                        "leave it room it may lie anywhere, and this is one such place"
                      : "no rows could be proved to hold the body, which no support does: it may be balanced on the "
                        "edge of its contact");
-    summary->timings.assemble += s->assemble_s;
-    summary->timings.total = uz_seconds() - s->started;
-    /* bounds of iterations were about regularized problems; that of the certificate alone is about this one */
-    uz_milestones milestones;
-    uz_milestones_init(&milestones, false);
-    uz_milestones_resume(&milestones, summary->timings.total);
-    uz_milestones_pause(&milestones);
-    uz_milestones_note(&milestones, UZ_MILESTONE_OF_CERTIFICATE, summary->certificate.relative_error,
-                       summary->iterations, 0);
-    result->trade = milestones.trade;
-    result->trade.total_s = milestones.trade.iterated_s;
+    count_times(result, s);
     return status;
+}
+
+uz_status uz_semi_refuse(uz_result **out, const uz_semi *s, const uz_error *why, uz_error *err)
+{
+    uz_result *result = uz_alloc_zero(1, sizeof *result);
+    uz_summary *summary = result ? &result->summary : NULL;
+    if (result) {
+        result->d = summary->d = s->d;
+        result->m = summary->m = summary->kept = s->m;
+        result->u = uz_alloc_zero(s->d, sizeof *result->u);
+        result->r = uz_alloc_zero(s->m, sizeof *result->r);
+        result->g = uz_alloc_zero(s->m, sizeof *result->g);
+    }
+    uz_status status = result && result->u && result->r && result->g
+                           ? UZ_OK
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result of %lld dofs", (long long)s->d);
+    if (status == UZ_OK && s->is_scene)
+        status = uz_describe_scene(result, &s->model, &s->problem->scene, result->u, s->prescribed, s->m, NULL, err);
+    if (status != UZ_OK) {
+        uz_result_free(result);
+        return status;
+    }
+    summary->outcome = UZ_UNHELD;
+    summary->row_scaling = UZ_ROW_SCALING_NONE;
+    summary->rounds = 1;
+    summary->requested_error = s->requested;
+    summary->semicoercive = (uz_semicoercive){.free_modes = s->k};
+    const char *end = strstr(why->message, "; "); /* what to do about it does not fit in beside others */
+    end = end ? end : strstr(why->message, ". ");
+    snprintf(summary->message, sizeof summary->message, "%.*s", end ? (int)(end - why->message) : 200, why->message);
+    uz_blank_answer(result);
+    count_times(result, s);
+    *out = result;
+    return UZ_OK;
 }

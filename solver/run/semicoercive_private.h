@@ -44,6 +44,9 @@ uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, doubl
  * last augmented problem did. */
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err);
 
+/* *out: in place of an answer, why there is none. */
+uz_status uz_semi_refuse(uz_result **out, const uz_semi *s, const uz_error *why, uz_error *err);
+
 /* UZ_ERR_FREE_BODY, if the load does not press the body on. strict: also where a motion only costs nothing. */
 uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err);
 

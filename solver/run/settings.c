@@ -46,6 +46,7 @@ static const char *const OUTCOMES[] = {
     [UZ_MOVING_GEOMETRY] = "moving_geometry",
     [UZ_UNSTABLE] = "unstable",
     [UZ_INVERTED] = "inverted",
+    [UZ_UNHELD] = "unheld",
 };
 static const char *const QUANTITIES[] = {
     [UZ_QUANTITY_CONTACT_FORCE] = "contact.force", [UZ_QUANTITY_REACTION] = "reaction",

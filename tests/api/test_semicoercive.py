@@ -147,6 +147,30 @@ def test_stabilized_bodies_of_each_kind(s):
         check(summary["outcome"] == "converged" and 0 < value < 1e-5 and abs(max(summary["contact"]["force"]) / force - 1) <= value, value, summary["contact"])
 
 
+def test_a_case_that_nothing_presses_on(s):
+    """It has no answer, and takes none from the others; where the mesh is refined, too. Where it is alone it is refused."""
+    loads = {"pressed": block(-0.05), "lifted": block(0.05), "none": block(0), "harder": block(-0.1)}
+    cases = [{"name": name, "loads": one["problem"]["loads"] if name != "none" else []} for name, one in loads.items()]
+    for mesh in {}, {"refine": "auto"}:
+        request = block(cases=cases)
+        request["problem"]["mesh"].update(mesh)
+        job = ended(s, request)
+        counts = job["summary"]["cases"]
+        check(job["summary"]["outcome"] == "unheld" and counts["converged"] == counts["unheld"] == 2 and counts["worst"] == "lifted", counts)
+        for name in "pressed", "harder":
+            of = expect(s.get(f"/v1/jobs/{job['id']}/result?case={name}&fields=displacements,reactions"), 200).json
+            check(of["summary"]["outcome"] == "converged" and None not in of["reactions"], of["summary"])
+            alone = block(cases=[cases[0 if name == "pressed" else 3]])
+            alone["problem"]["mesh"].update(mesh)
+            check(math.isclose(ended(s, alone)["summary"]["contact"]["force"][1], of["summary"]["contact"]["force"][1], rel_tol=1e-7), name)
+        of = expect(s.get(f"/v1/jobs/{job['id']}/result?case=lifted&fields=displacements"), 200).json
+        check("along +y" in of["summary"]["message"] and set(sum(of["displacements"], [])) == {None}, of["summary"])
+    check(error_of(s, block(cases=cases[1:3]))["pointer"] == "/cases/0/loads")
+    springs = chain(1, 1)
+    job = ended(s, {**springs, "cases": [{"name": "on", "p": [1, 1]}, {"name": "off", "p": [-1, -1]}]})
+    check(job["summary"]["cases"]["converged"] == job["summary"]["cases"]["unheld"] == 1, job)
+
+
 def test_it_cannot_be_verified(s):
     for body in block(), chain(1, 1):
         job = ended(s, body)["id"]

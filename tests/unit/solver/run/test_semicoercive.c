@@ -253,7 +253,8 @@ static uz_load_case pushing(const char *name, double push)
     return one;
 }
 
-/* Each load is solved by itself; the one that does not press the body on is named. */
+/* Each load is solved by itself: one that does not press the body on leaves the others their answers, and where none
+ * does the first is named. */
 TEST(load_cases_of_a_floating_block)
 {
     uz_problem problem = problem_in(rolled_block(12, 4, 0, -1));
@@ -273,9 +274,19 @@ TEST(load_cases_of_a_floating_block)
     }
     uz_results_free(results, 3);
     problem.cases[1].loads->v[1] = 1;
+    CHECK_MSG(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    for (int64_t k = 0; results && k < 3; k++) {
+        const uz_summary *told = &results[k]->summary;
+        CHECK_STR(uz_choice_name(UZ_CHOICE_OUTCOME, told->outcome), k == 1 ? "unheld" : "converged");
+        CHECK(k == 1 ? strstr(told->message, "translation along +y") != NULL && isnan(results[k]->u[0])
+                     : fabs(told->force[1] - 300.0 * (double)(k + 1)) < 1e-5);
+    }
+    uz_results_free(results, 3);
+    for (int64_t k = 0; k < 3; k++)
+        problem.cases[k].loads->v[1] = 1;
     CHECK_INT(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err), UZ_ERR_FREE_BODY);
     CHECK(results == NULL);
-    CHECK_STR(err.where, "/cases/1/loads");
+    CHECK_STR(err.where, "/cases/0/loads");
     CHECK(strstr(err.message, "translation along +y"));
     uz_problem_clear(&problem);
 }
