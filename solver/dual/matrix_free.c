@@ -646,7 +646,9 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 {
     free_load *x = (free_load *)load;
     uz_bounded *box = x->sparse.box;
-    if (x->coarse <= 0.0)
+    if (load->equations)
+        x->coarse = DBL_MIN;
+    else if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
     if (!box)
         return solve_active_rows(x, end, r, g, active, err);

@@ -35,6 +35,9 @@ enum { MOST_STEPS = 40, MOST_LIFTS = 5 };
  */
 #define TOUCHING 1e-13
 
+/* Of solves that are not exact: what they leave of x, in the energy norm. */
+#define SOLVED 1e-6
+
 /* Before an obstacle what is no wider open, of the widest, is closed: rounding. */
 #define CLOSED 1e-10
 
@@ -331,8 +334,10 @@ static uz_status solve_held(rows_problem *x, bool *solved, uz_error *err)
     memcpy(x->load, x->p, (size_t)x->d * sizeof *x->load);
     uz_csc_gaxpy_t(x->load, x->N, 1, x->reaction);
     uz_status status = uz_dual_load_create(&load, dual, x->K, x->load, x->h, err);
-    if (status == UZ_OK)
-        status = uz_dual_load_aim(load, NAN, x->stop, err);
+    if (status == UZ_OK) {
+        load->equations = true;
+        status = uz_dual_load_aim(load, SOLVED, x->stop, err);
+    }
     if (status == UZ_OK && any)
         status = uz_dual_load_solve_active(load, &ended, x->r, x->gap, held, err);
     if (status == UZ_OK && ended == UZ_ACTIVE_SOLVED)

@@ -56,8 +56,11 @@
 /* Of the square of what the equations leave, in the energy of that. */
 #define OF_ITSELF 1.5
 
-/* Solves that are not exact go on to this part of the adjoint's norm. */
-#define SOLVED 1e-6
+/* Solves that are not exact go on to this part of the adjoint's norm, or to this part of what the mesh leaves of it,
+ * which is taken to be as much as of the answer: where that is more. */
+#define SOLVED   1e-6
+#define OF_MESH  1e-2
+#define ROUGHEST 1e-3
 
 /* Of large deformation: gaps that are less, in the body's size, may be none. */
 #define ROUNDING 1e-9
@@ -76,6 +79,7 @@ typedef struct {
     double *free_strain;
     bool coarse;
     double own_error;    /* |e_u|^2 */
+    double aim;          /* of solves for z, in parts of its norm */
     double *of_elements; /* 3 n_elements: |e_u|^2 of each; of u plus and less z */
     double *least[2];    /* n_elements: no less of u, of z; NULL: nothing is known (assembly/thin_elements.h) */
 } adjoint;
@@ -153,6 +157,8 @@ static uz_status begin(adjoint *x, uz_error *err)
         status = least_of(&x->least[0], x, x->answer->u, 1, 1, err);
     for (int64_t e = 0; e < model->mesh.n_elements && status == UZ_OK; e++)
         x->own_error += own_error_of(x, e) - x->of_elements[e];
+    const double strain = x->answer->evaluation->strain_energy;
+    x->aim = fmax(SOLVED, fmin(ROUGHEST, strain > 0 ? OF_MESH * sqrt(x->own_error / strain) : 0));
     return status;
 }
 
@@ -169,7 +175,7 @@ static uz_status iterate(adjoint *x, bool *solved, uz_dual_load *load, uz_error 
         r[i] = s[i] = x->active[i] ? load->g0[i] : 0;
         rr += r[i] * r[i];
     }
-    aim = SOLVED * SOLVED * rr;
+    aim = x->aim * x->aim * rr;
     *solved = !(rr > 0);
     for (int step = 0; step < MOST_STEPS && status == UZ_OK && !*solved && !uz_stop_is_due(x->work->stop); step++) {
         double sDs = 0, next = 0;
@@ -220,8 +226,10 @@ static uz_status solve_on_factor(adjoint *x, bool *solved, const uz_functional *
         uz_csc_gaxpy_t(x->p, &model->N, 1, x->of_rows);
     }
     uz_status status = uz_dual_load_create(&load, work->dual, work->K, x->p, x->h, err);
-    if (status == UZ_OK)
-        status = uz_dual_load_aim(load, SOLVED, work->stop, err);
+    if (status == UZ_OK) {
+        load->equations = true;
+        status = uz_dual_load_aim(load, x->aim, work->stop, err);
+    }
     memset(x->y, 0, (size_t)m * sizeof *x->y);
     *solved = count == 0;
     if (status == UZ_OK && !*solved) {

@@ -189,6 +189,24 @@ def test_quantities(s):
     check(found["down"]["low"] < found["down"]["on_this_mesh"] < found["down"]["high"] < 0, found["down"])
 
 
+def test_without_a_factor(s):
+    """The same intervals, and as much is proved: adjoints were left at two digits, by which energies were only estimated."""
+    scene = {"model": "plane_strain", "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "kinematics": "fixed",
+             "supports": [{"on": "left", "ux": 0, "uy": 0}, {"on": "floor", "ux": 0, "uy": 0}],
+             "loads": [{"on": "top", "traction": [1.5, -5]}], "contacts": [{"on": "bottom", "with": "bed"}]}
+    groups = {"left": [(0, "left")], "top": [(0, "top")], "bottom": [(0, "bottom")], "bed": [(1, "top")], "floor": [(1, "bottom")]}
+    pair = body(("quad8", "quad8"), ((6, 2), (7, 3)), (lambda x, y: (4 * x, 1.2 * y), lambda x, y: (4.8 * x - 0.4, 1.5 * y - 1.5)), groups, **scene)
+    pair["quantities"] = [{"quantity": "contact.force"}, {"quantity": "strain_energy"}, {"quantity": "displacement", "on": "top", "direction": [3, 4]}]
+    found = []
+    for operator in "condensed", "matrix_free":
+        pair["solver"] = {"operator": operator, "accuracy": {"relative_error": 1e-8, "guaranteed": True}}
+        found.append(summary_of(s, pair)["quantities"])
+    for factor, free in zip(*found):
+        width, other = factor["high"] - factor["low"], free["high"] - free["low"]
+        check(factor["kind"] == free["kind"] and abs(other - width) < 1e-2 * width, factor, free)
+    check(found[0][1]["kind"] == "guaranteed", found[0])
+
+
 TUBE = {"kind": "scene", "model": "axisymmetric", "mesh": {"box": {"origin": [1, 0], "size": [1, 1], "cells": [16, 4], "element": "quad4"}},
         "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "bottom", "uy": 0}, {"on": "top", "uy": 0}],
         "loads": [{"on": "left", "pressure": 10}], "contacts": []}
