@@ -532,12 +532,15 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     for (int64_t i = 0; i < n; i++)
         length = hypot(length, x->z[i]);
     const double depth = depth_shift(x, of, x->depth), bulge = depth_shift(x, of, x->bulge);
-    const double shift = (both[0] - both[1]) / (4 * scale), spring = spring_shift(x);
+    const double shift = norm > 0 ? (both[0] - both[1]) / (4 * scale) : 0, spring = spring_shift(x);
     const double of_kind = !pressed ? OF_OTHER : x->free_strain ? OF_HEAT : OF_CONTACT;
     const double times = of_kind * (x->work->place ? OF_LARGE : 1);
     double *part = x->of_elements + model->mesh.n_elements;
-    out->mesh = OF_ESTIMATE * fabs(shift) + product_of_errors(part, x, scale) +
-                OF_DEPTH * (fabs(depth) + fabs(spring)) + fabs(bulge) + end_error(part, x) + of->blur;
+    if (!(norm > 0)) /* z is 0: what is left of differences is rounding of u's own */
+        memset(part, 0, (size_t)model->mesh.n_elements * sizeof *part);
+    const double product = norm > 0 ? product_of_errors(part, x, scale) : 0;
+    out->mesh = OF_ESTIMATE * fabs(shift) + product + OF_DEPTH * (fabs(depth) + fabs(spring)) + fabs(bulge) +
+                end_error(part, x) + of->blur;
     double whole = fabs(out->found); /* a reaction may be what large forces leave of each other */
     for (int64_t i = 0; i < model->m && out->kind == UZ_QUANTITY_REACTION; i++)
         whole += fabs(x->answer->r[i]);

@@ -195,6 +195,24 @@ TEST(intervals_without_a_factor_are_no_wider)
     }
 }
 
+/* Where nothing presses the adjoint of a force is 0: what rounding left of it was an energy, and no force. */
+TEST(a_force_of_what_does_not_touch_has_no_width)
+{
+    quantities asked = {.n = 0};
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, "tri3", (double[3]){4e9, 1e9, 0}, (int64_t[3]){8, 3, 0});
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+    s.materials[0].young = 1;
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "right", 0, 1e-3, 0);
+    body_plane(&s, "bottom", (double[3]){0, -1e9, 0}, (double[3]){0, 1, 0});
+    ask(&asked, UZ_QUANTITY_CONTACT_FORCE, "bottom", 0, 0, 0);
+    uz_result *result = solve(&s, &asked, UZ_OPERATOR_AUTO, NULL);
+    const uz_quantity_found *q = &result->evaluation->quantities[0];
+    CHECK_MSG(q->low == 0 && q->high == 0, "%g %g", q->low, q->high);
+    clear(&s, result);
+}
+
 /* A body that only the obstacle holds: what it is pressed with is the force, whatever the mesh. */
 TEST(a_body_without_supports)
 {
