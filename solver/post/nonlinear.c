@@ -9,10 +9,11 @@
  * All of this is in parts of the whole energy, and of a strip that is pressed or pulled along its axis that is nearly
  * all along the axis: what its stress does to how it bends aside is not seen. It is P / P_0 of that, P_0 the load that
  * buckles it where one end is free: a strain of pi^2 / 48 (h / L)^2 of a length L and a thickness h (Euler). A plane
- * body is taken for such a strip, of its own area along its diagonal, a solid for the brick that has its moments of
- * inertia, P is its mean stress, which of a body that only bends is next to none, and what bends aside the part of the
- * gradient that turns. From half of P_0 on it counts in any case. Area in thin parts along the diagonal, as of a frame,
- * is taken for a thicker strip. Forces may be off by more than the energy: leverage.c says by how much. */
+ * body is taken for such a strip, of its own area along the diagonal of a rectangle of its polar moment, a solid for
+ * the brick that has its moments of inertia, P is its mean stress, which of a body that only bends is next to none, and
+ * what bends aside the part of the gradient that turns. From half of P_0 on it counts in any case. Area in thin parts
+ * along the diagonal, as of a frame, is taken for a thicker strip. Forces may be off by more than the energy:
+ * leverage.c says by how much. */
 #include "post/balance.h"
 
 #include "assembly/parts.h"
@@ -170,20 +171,31 @@ static double total(const uz_lanes *of)
     return sum;
 }
 
-/* (h / L)^2 of a plane body. */
+/* (h / L)^2 of a plane body, L^2 + h^2 the square of the diagonal of the rectangle that has its polar moment of area,
+ * 12 I / A: however the body stands. */
 static double flatness_in_plane(const uz_mesh *mesh)
 {
-    double area = 0;
+    double area = 0, first[2] = {0}, second = 0;
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         int nodes;
         const int64_t *node = uz_mesh_element(mesh, e, &nodes);
         const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
         for (int a = 0; a < corners; a++) {
-            const double *x = mesh->xyz + 2 * node[a], *y = mesh->xyz + 2 * node[(a + 1) % corners];
-            area += 0.5 * (x[0] * y[1] - x[1] * y[0]);
+            double x[2], y[2], square = 0; /* from the first node */
+            for (int c = 0; c < 2; c++) {
+                x[c] = mesh->xyz[2 * node[a] + c] - mesh->xyz[c];
+                y[c] = mesh->xyz[2 * node[(a + 1) % corners] + c] - mesh->xyz[c];
+                square += x[c] * x[c] + x[c] * y[c] + y[c] * y[c];
+            }
+            const double twice = x[0] * y[1] - x[1] * y[0];
+            area += twice / 2;
+            for (int c = 0; c < 2; c++)
+                first[c] += twice * (x[c] + y[c]) / 6;
+            second += twice * square / 12;
         }
     }
-    const double size = uz_mesh_size(mesh), flat = area / (size * size);
+    const double polar = second - (first[0] * first[0] + first[1] * first[1]) / area;
+    const double flat = area * area / (12 * polar);
     return flat * flat;
 }
 

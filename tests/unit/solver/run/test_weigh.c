@@ -439,6 +439,32 @@ TEST(forces_that_small_deformation_leaves_out)
 }
 
 /* Loads that hold each other leave rounding to supports, of which no part is a reason for anything. */
+static void turn(double x[3])
+{
+    const double c = cos(0.7), s = sin(0.7), along = x[0];
+    x[0] = c * along - s * x[1];
+    x[1] = s * along + c * x[1];
+}
+
+/* A block that was turned was told to be four times as slender. */
+TEST(how_slender_a_body_is_does_not_depend_on_how_it_stands)
+{
+    double left_out[2];
+    for (int k = 0; k < 2; k++) {
+        uz_scene s = block("quad8", 1.5, 1, 3, 2);
+        body_give_mesh(&s, k ? turn : NULL);
+        body_hold(&s, "left", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_PRESSURE, "right", 0, 0, 0);
+        s.loads[0].value = -0.05;
+        uz_result *result = solve_as(&s, UZ_KINEMATICS_AUTO, UZ_ELASTIC_LINEAR);
+        left_out[k] = result->evaluation->nonlinear;
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+    CHECK(left_out[0] > 0.01);
+    CHECK_REL(left_out[1], left_out[0], 1e-9);
+}
+
 TEST(forces_that_are_rounding_are_not_compared)
 {
     static const double PULL[] = {1e-6, 1e-4, 3e-3};
