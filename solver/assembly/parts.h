@@ -129,9 +129,9 @@ void uz_add_stiffness(uz_body_model *model, const double *ke, const int64_t *nod
 uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, bool diagonal, uz_error *err);
 /* Refuses what uz_build_stiffness would refuse. */
 uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
-/* Twice the strain energy of the elements from begin to end - 1, without springs, by their strains: for meshes whose
- * elements do not share a matrix. nodal: n_nodes x dim. UZ_ERR_MEMORY. */
-uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, int64_t begin,
-                                     int64_t end, uz_error *err);
+/* Twice the strain energy of the elements from begin to end - 1, without springs, by their strains. nodal: n_nodes x
+ * dim; carried: as of uz_strain_energy. UZ_ERR_MEMORY. */
+uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, bool carried,
+                                     int64_t begin, int64_t end, uz_error *err);
 
 #endif

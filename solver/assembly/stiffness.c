@@ -469,45 +469,9 @@ uz_status uz_build_stiffness(uz_body_model *model, const uz_scene *scene, uz_err
 
 /* ------------------------------------------------------------ strain energy */
 
-/* An element's displacements less the rotation that fits them best, which strains nothing: what it leaves by rounding
- * is eps of its square, while the strain beside it may be a millionth of it. Minimizes sum |d_a - w x x_a|^2, with x
- * and d from the first node. */
-static void take_unrotated(double *d, const uz_mesh *mesh, const int64_t *node, int count)
-{
-    const int dim = mesh->dim;
-    double x[UZ_ELEMENT_NODES][3] = {{0}}, u[UZ_ELEMENT_NODES][3] = {{0}}, J[3][3] = {{0}}, w[3] = {0};
-    for (int a = 0; a < count; a++) {
-        for (int c = 0; c < dim; c++) {
-            x[a][c] = mesh->xyz[node[a] * dim + c] - mesh->xyz[node[0] * dim + c];
-            u[a][c] = d[a * dim + c];
-        }
-        for (int i = 0; i < 3; i++) {
-            const int j = (i + 1) % 3, k = (i + 2) % 3;
-            J[i][i] += x[a][j] * x[a][j] + x[a][k] * x[a][k];
-            J[i][j] = J[j][i] -= x[a][i] * x[a][j];
-            w[i] += x[a][j] * u[a][k] - x[a][k] * u[a][j];
-        }
-    }
-    for (int i = dim == 3 ? 0 : 2; i < 3; i++) /* elimination; in the plane the third axis stands alone */
-        for (int k = i + 1; k < 3; k++) {
-            const double factor = J[k][i] / J[i][i];
-            for (int j = i; j < 3; j++)
-                J[k][j] -= factor * J[i][j];
-            w[k] -= factor * w[i];
-        }
-    for (int i = 2; i >= 0; i--) {
-        for (int j = i + 1; j < 3; j++)
-            w[i] -= J[i][j] * w[j];
-        w[i] = dim == 3 || i == 2 ? w[i] / J[i][i] : 0;
-    }
-    for (int a = 0; a < count; a++)
-        for (int c = 0; c < dim; c++)
-            d[a * dim + c] -= w[(c + 1) % 3] * x[a][(c + 2) % 3] - w[(c + 2) % 3] * x[a][(c + 1) % 3];
-}
-
 /* Displacements of an element's nodes against those of the first: a translation strains nothing, and what it would
  * leave by rounding grows with it. Not along the radius. Returns how many. */
-static int take_nodal(double d[DOFS], const uz_body_model *model, const double *nodal, int64_t e, bool carried)
+static int take_nodal(double d[DOFS], const uz_body_model *model, const double *nodal, int64_t e)
 {
     int count;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
@@ -516,16 +480,14 @@ static int take_nodal(double d[DOFS], const uz_body_model *model, const double *
     for (int a = 0; a < count; a++)
         for (int c = 0; c < dim; c++)
             d[a * dim + c] = nodal[node[a] * dim + c] - (rings && c == 0 ? 0 : nodal[node[0] * dim + c]);
-    if (carried && !rings)
-        take_unrotated(d, &model->mesh, node, count);
     return count * dim;
 }
 
 /* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
-static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e, bool carried)
+static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
 {
     double d[DOFS], sum = 0;
-    const int n = take_nodal(d, model, nodal, e, carried);
+    const int n = take_nodal(d, model, nodal, e);
     for (int i = 0; i < n; i++) {
         double row = 0;
         for (int j = 0; j < i; j++)
@@ -573,7 +535,7 @@ static inline __attribute__((always_inline)) double energy_hex8(const uz_body_mo
     enum { N = 24, WIDE = N / 4 };
     double d[DOFS];
     four row[WIDE] = {{0}}, sum = {0};
-    take_nodal(d, model, nodal, e, false);
+    take_nodal(d, model, nodal, e);
     for (int j = 0; j < N; j++) {
         const four *column = (const four *)(ke + j * N);
         row[0] += column[0] * d[j];
@@ -595,9 +557,9 @@ UZ_AVX2_FMA static double energy_hex8_wide(const uz_body_model *model, const dou
 
 typedef double (*element_energy)(const uz_body_model *model, const double *ke, const double *nodal, int64_t e);
 
-/* Twice the energy of elements begin to end - 1. */
-static uz_status add_energies(double *twice, const uz_body_model *model, const double *nodal, bool carried,
-                              int64_t begin, int64_t end, uz_error *err)
+/* Twice the energy of elements begin to end - 1, which share their matrices. */
+static uz_status add_energies(double *twice, const uz_body_model *model, const double *nodal, int64_t begin,
+                              int64_t end, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     const bool wide = uz_cpu_has_avx2_fma();
@@ -607,20 +569,11 @@ static uz_status add_energies(double *twice, const uz_body_model *model, const d
     const double *ke;
     uz_status status = source_init(&source, model, err);
     for (int64_t e = begin; e < end && status == UZ_OK; e++) {
-        if (!source.shared) { /* a matrix of its own would be made for it alone; it is rotated back */
-            uz_element element;
-            double d[DOFS], xyz[3 * UZ_ELEMENT_NODES];
-            take_nodal(d, model, nodal, e, carried);
-            uz_body_element(&element, xyz, model, e);
-            *twice += 2 * uz_element_strain_energy(&element, d);
-            continue;
-        }
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            *twice += carried                     ? energy_any(model, ke, nodal, e, true)
-                      : mesh->kind[e] == UZ_QUAD4 ? of_quad4(model, ke, nodal, e)
-                      : mesh->kind[e] == UZ_HEX8  ? of_hex8(model, ke, nodal, e)
-                                                  : energy_any(model, ke, nodal, e, false);
+            *twice += mesh->kind[e] == UZ_QUAD4  ? of_quad4(model, ke, nodal, e)
+                      : mesh->kind[e] == UZ_HEX8 ? of_hex8(model, ke, nodal, e)
+                                                 : energy_any(model, ke, nodal, e);
     }
     source_clear(&source);
     return status;
@@ -643,16 +596,16 @@ static void add_share(void *ctx, int share)
     const int64_t n = sum->model->mesh.n_elements, middle = n < WORTH_SHARING ? 0 : n / 2;
     const int64_t begin = share == 0 ? 0 : middle, end = share == 0 ? middle : n;
     double *twice = &sum->twice[share];
-    sum->status[share] = sum->by_strains
-                             ? uz_strain_energy_of_groups(twice, sum->model, sum->nodal, begin, end, &sum->err[share])
-                             : add_energies(twice, sum->model, sum->nodal, sum->carried, begin, end, &sum->err[share]);
+    sum->status[share] = sum->by_strains ? uz_strain_energy_of_groups(twice, sum->model, sum->nodal, sum->carried,
+                                                                      begin, end, &sum->err[share])
+                                         : add_energies(twice, sum->model, sum->nodal, begin, end, &sum->err[share]);
 }
 
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
     energy_sum sum = {.model = model, .nodal = nodal, .carried = carried};
-    sum.by_strains = !carried && (!mesh->uniform || model->kind == UZ_AXISYMMETRIC);
+    sum.by_strains = carried || !mesh->uniform || model->kind == UZ_AXISYMMETRIC;
     if (mesh->n_elements < WORTH_SHARING)
         add_share(&sum, 1);
     else

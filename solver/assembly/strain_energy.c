@@ -1,5 +1,5 @@
-/* strain_energy.c: the energy of elements of different shapes, of which no matrix is kept: by their strains, some
- * elements at a time. */
+/* strain_energy.c: the energy of elements of different shapes, of which no matrix is kept, or of a body that is carried
+ * along: by their strains, some elements at a time. */
 #include "assembly/parts.h"
 
 #include "assembly/strain_group.h"
@@ -72,12 +72,13 @@ static void add_group(void *ctx, const uz_strain_group *group)
         (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(ctx, group);
 }
 
-uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, int64_t begin,
-                                     int64_t end, uz_error *err)
+uz_status uz_strain_energy_of_groups(double *twice, const uz_body_model *model, const double *nodal, bool carried,
+                                     int64_t begin, int64_t end, uz_error *err)
 {
     energy_sum sum = {.model = model};
     const uz_strain_work work = {make_rule, add_group, &sum};
-    const uz_strain_source from = {.model = model, .nodal = nodal, .apart = true, .begin = begin, .end = end};
+    const uz_strain_source from = {
+        .model = model, .nodal = nodal, .apart = true, .unrotated = carried, .begin = begin, .end = end};
     const uz_status status = uz_strain_groups(&work, &from, NULL, err);
     *twice = sum.twice;
     return status;

@@ -59,6 +59,41 @@ static void strains_of_each(uz_strain_group *g, const uz_body_model *model)
     }
 }
 
+/* What the rotation leaves by rounding is eps of its square, while the strain beside it may be a millionth of it.
+ * Minimizes sum |u_a - w x x_a|^2, with x and u from the first node. */
+UZ_INLINE void take_unrotated(uz_strain_group *g, int dim)
+{
+    uz_lanes x[UZ_ELEMENT_NODES][3] = {{{0}}}, J[3][3] = {{{0}}}, w[3] = {{0}};
+    for (int a = 1; a < g->rule.nodes; a++) {
+        uz_lanes u[3] = {{0}};
+        for (int c = 0; c < dim; c++) {
+            x[a][c] = g->x[a * dim + c] - g->x[c];
+            u[c] = g->u[a * dim + c];
+        }
+        for (int i = 0; i < 3; i++) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            J[i][i] += x[a][j] * x[a][j] + x[a][k] * x[a][k];
+            J[i][j] = J[j][i] -= x[a][i] * x[a][j];
+            w[i] += x[a][j] * u[k] - x[a][k] * u[j];
+        }
+    }
+    for (int i = dim == 3 ? 0 : 2; i < 3; i++) /* elimination; in the plane the third axis stands alone */
+        for (int k = i + 1; k < 3; k++) {
+            const uz_lanes factor = J[k][i] / J[i][i];
+            for (int j = i; j < 3; j++)
+                J[k][j] -= factor * J[i][j];
+            w[k] -= factor * w[i];
+        }
+    for (int i = 2; i >= 0; i--) {
+        for (int j = i + 1; j < 3; j++)
+            w[i] -= J[i][j] * w[j];
+        w[i] = dim == 3 || i == 2 ? w[i] / J[i][i] : (uz_lanes){0};
+    }
+    for (int a = 1; a < g->rule.nodes; a++)
+        for (int c = 0; c < dim; c++)
+            g->u[a * dim + c] -= w[(c + 1) % 3] * x[a][(c + 2) % 3] - w[(c + 2) % 3] * x[a][(c + 1) % 3];
+}
+
 UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
 {
     const uz_mesh *mesh = &from->model->mesh;
@@ -87,6 +122,8 @@ UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
         uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }
+    if (from->unrotated && from->model->kind != UZ_AXISYMMETRIC)
+        take_unrotated(g, dim);
     if (from->large)
         uz_lane_green_strains(g->strain, &g->rule, &g->shape, g->u);
     else if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
