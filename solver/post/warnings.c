@@ -9,6 +9,7 @@
 #include "scene/scene.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -77,20 +78,25 @@ typedef struct {
     atomic_bool found;
 } steepness;
 
+static bool is_element_steep(const uz_mesh *mesh, const double *u, double square, int64_t e)
+{
+    const int dim = mesh->dim;
+    const double *x = mesh->xyz;
+    const int64_t first = mesh->node[mesh->first[e]] * dim;
+    bool found = false;
+    for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
+        const int64_t i = mesh->node[k] * dim;
+        found = found || uz_distance2(u + i, u + first, dim) > square * uz_distance2(x + i, x + first, dim);
+    }
+    return found;
+}
+
 static void look_for_steep(void *ctx, int64_t begin, int64_t end)
 {
     steepness *s = ctx;
-    const uz_mesh *mesh = s->mesh;
-    const int dim = mesh->dim;
-    const double *x = mesh->xyz, *u = s->u;
     bool found = false;
-    for (int64_t e = begin; e < end && !found; e++) {
-        const int64_t first = mesh->node[mesh->first[e]] * dim;
-        for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
-            const int64_t i = mesh->node[k] * dim;
-            found = found || uz_distance2(u + i, u + first, dim) > s->square * uz_distance2(x + i, x + first, dim);
-        }
-    }
+    for (int64_t e = begin; e < end && !found; e++)
+        found = is_element_steep(s->mesh, s->u, s->square, e);
     if (found)
         s->found = true;
 }
@@ -151,32 +157,64 @@ static void look_at_element(double *strained, double *turned, const uz_field_bod
     *turned = 0.5 * sqrt(x * x + y * y + z * z);
 }
 
-static void look_at_elements(const doubts *d)
+/* The first element that has the most of something. */
+typedef struct {
+    double value;
+    int64_t element;
+} most_of;
+
+static void take_more(most_of *to, double value, int64_t element)
+{
+    if (value > to->value || (value == to->value && element < to->element))
+        *to = (most_of){value, element};
+}
+
+typedef struct {
+    const doubts *d;
+    uz_field_body body;
+    double square;         /* of the slope without which an element is not looked at */
+    pthread_mutex_t mutex; /* of what follows */
+    most_of strain, rotation;
+} elements_look;
+
+static void look_at_some(void *ctx, int64_t begin, int64_t end)
+{
+    elements_look *look = ctx;
+    const double *u = look->d->u;
+    most_of strain = {0}, rotation = {0};
+    for (int64_t e = begin; e < end; e++) {
+        double here, turn;
+        if (!is_element_steep(&look->d->model->mesh, u, look->square, e))
+            continue;
+        look_at_element(&here, &turn, &look->body, u, e);
+        take_more(&strain, here, e);
+        take_more(&rotation, turn, e);
+    }
+    pthread_mutex_lock(&look->mutex);
+    take_more(&look->strain, strain.value, strain.element);
+    take_more(&look->rotation, rotation.value, rotation.element);
+    pthread_mutex_unlock(&look->mutex);
+}
+
+static void look_at_elements(const doubts *d, double slope)
 {
     const uz_mesh *mesh = &d->model->mesh;
-    const uz_field_body body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6};
-    double rotation = 0, strain = 0;
-    int64_t turned = 0, strained = 0;
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        double here, turn;
-        look_at_element(&here, &turn, &body, d->u, e);
-        if (here > strain) {
-            strain = here;
-            strained = e;
-        }
-        if (turn > rotation) {
-            rotation = turn;
-            turned = e;
-        }
-    }
+    elements_look look = {
+        .d = d,
+        .body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6},
+        .square = slope * slope,
+        .mutex = PTHREAD_MUTEX_INITIALIZER,
+    };
+    uz_by_pieces(look_at_some, &look, mesh->n_elements);
+    const double rotation = look.rotation.value, strain = look.strain.value;
     if (rotation > MOST_ROTATION)
         warn(d->out, "large_rotation", rotation,
              "element %lld turns by %.2g rad; small rotations were assumed, and beyond %g they are not small",
-             (long long)turned, rotation, MOST_ROTATION);
+             (long long)look.rotation.element, rotation, MOST_ROTATION);
     if (strain > MOST_STRAIN)
         warn(d->out, "large_strain", strain,
              "element %lld is strained by %.2g; small strains were assumed, and beyond %g they are not small",
-             (long long)strained, strain, MOST_STRAIN);
+             (long long)look.strain.element, strain, MOST_STRAIN);
 }
 
 /* Could uz_measure_nonlinear come to anything? Gradients are at most about four times the slope that is_steep finds,
@@ -621,8 +659,9 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     const uz_summary *s = &result->summary;
     const doubts d = {
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation, false};
-    if (is_steep(&d, 0.25 * fmin(MOST_STRAIN, MOST_ROTATION)))
-        look_at_elements(&d);
+    const double slope = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
+    if (is_steep(&d, slope))
+        look_at_elements(&d, slope);
     uz_status status = UZ_OK;
     d.out->nonlinear = NAN;
     if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene) &&
