@@ -100,6 +100,9 @@ typedef struct {
                        double *x, double *r, const double *b, int count, const struct uz_cg_stop *stop, uz_error *err);
 } uz_multigrid_kind;
 
+/* Of a tolerance the most that single precision may hide. */
+#define UZ_HIDDEN 0.1
+
 /* What every kind begins with. */
 struct uz_multigrid {
     const uz_multigrid_kind *kind;

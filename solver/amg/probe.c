@@ -209,8 +209,10 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_h
     }
     if (status == UZ_OK && !(amg->info.least > 0.0))
         status = fail_probes(missed, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK) {
         amg->info.rcond = fmin(amg->info.rcond, 1.0 / reach);
+        amg->mg->drift = FLT_EPSILON / sqrt(amg->info.rcond);
+    }
     if (x.room)
         amg->mg->kind->free_room(x.room);
     free(x.y);

@@ -22,9 +22,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a tolerance the most that rounding may hide. */
-#define HIDDEN 0.1
-
 /* Vectors of level 0, in the room that a product in double precision has and in that of its step, and what is done to
  * pieces of them. At held dofs s, p, z and D are 0, and so is all at the surplus numbers of a node. */
 typedef struct {
@@ -209,7 +206,8 @@ uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz
     rough v;
     bool begun = false;
     memset(info, 0, sizeof *info);
-    if (base->levels == 1 || !(base->drift > 0.0) || (!(stop->absolute > 0.0) && stop->relative * HIDDEN < base->drift))
+    if (base->levels == 1 || !(base->drift > 0.0) ||
+        (!(stop->absolute > 0.0) && stop->relative * UZ_HIDDEN < base->drift))
         return UZ_OK;
     uz_status status = begin(&v, &begun, (const uz_aggregates *)base, room, r, err);
     if (status != UZ_OK || !begun)
@@ -217,7 +215,7 @@ uz_status uz_solve_roughly(const uz_multigrid *base, uz_multigrid_room *room, uz
     info->first = info->last = v.unit * uz_root(v.square);
     const double goal = fmax(stop->absolute, stop->relative * info->first);
     info->met = info->first <= goal;
-    if (!info->met && goal * HIDDEN >= base->drift * info->first) {
+    if (!info->met && goal * UZ_HIDDEN >= base->drift * info->first) {
         v.whole_x = x;
         v.whole_r = r;
         status = iterate(&v, info, goal / v.unit, stop, err);

@@ -278,12 +278,17 @@ static bool fetch(const far_system *s, double *x, int count)
     return done;
 }
 
+/* A share of the residual that is believed in single precision until drift is known: before that there are trials
+ * alone, whose residuals are found here and looked at. */
+#define TRIAL_LEFT 1e-2
+
 /* Up to `most` steps while the square is above goal2. */
 static bool make_steps(const far_system *s, int *made, bool *flat, int most, double goal2)
 {
     uz_wire_head head;
     *made = 0;
-    const uz_wire_head question = {.kind = UZ_WIRE_STEPS, .b = most, .x = goal2};
+    const double drift = s->body->base.drift, believed = drift > 0.0 ? drift / UZ_HIDDEN : TRIAL_LEFT;
+    const uz_wire_head question = {.kind = UZ_WIRE_STEPS, .b = most, .x = goal2, .y = believed};
     if (!ask_of(s, question) || !hear(s->body->group, &head, UZ_WIRE_STATE))
         return false;
     if (head.a < 0 || head.a > most)

@@ -17,7 +17,8 @@
  *     -> BEGIN   a: system, b: 1: from 0, c: 1, or 2 for two right-hand sides at once; unless from 0 the start of
  *                each (double); right-hand side of each (double)
  *                                                        <- STATE   x: r'M^-1 r, here and below of the worse one
- *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it
+ *     -> STEPS   a: system, b: at most so many, x: until r'M^-1 r is not above it; y: single precision is believed
+ *                that where sqrt(x) is not below y times the root of the last one in double precision
  *     <- STATE   a: made, fewer where there is no more to gain, b: 1 where p'K p was not positive, x: r'M^-1 r
  *     -> AGAIN   a: system; from the true residual          <- STATE   x: r'M^-1 r
  *     -> FETCH   a: system                                  <- VECTOR  x of each
@@ -49,7 +50,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 9
+#define UZ_WIRE_VERSION 10
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -382,7 +382,7 @@ static PetscErrorCode make_steps(group *g, spread_system *s, const uz_wire_head 
     bool flat;
     PetscFunctionBeginUser;
     PetscCheck(m->b > 0 && m->b <= UZ_WIRE_STEPS_MOST, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "too many steps");
-    const int made = system_steps(s, (int)m->a, &flat, (int)m->b, m->x);
+    const int made = system_steps(s, (int)m->a, &flat, (int)m->b, m->x, m->y * m->y);
     answer(g, (uz_wire_head){.kind = UZ_WIRE_STATE, .id = m->id, .a = made, .b = flat, .x = system_square(s)});
     PetscFunctionReturn(0);
 }

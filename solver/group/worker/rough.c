@@ -10,9 +10,9 @@
  * r'z = s'(D'z + L'z).
  *
  * Rounding leads these steps away from the true residual. So that is computed in double precision each time that they
- * have reduced it by CARRIED, and where they meet the goal, and the direction goes on from there (van der Vorst, Ye,
- * SIAM J. Sci. Comput. 22 (2000)). Where it is not as small as they have it, or it takes more than STEPS_MOST of them,
- * K is too ill-conditioned for them. */
+ * have reduced it by CARRIED, and where they meet a goal below what rounding may hide, and the direction goes on from
+ * there (van der Vorst, Ye, SIAM J. Sci. Comput. 22 (2000)). Where it is not as small as they have it, or it takes more
+ * than STEPS_MOST of them, K is too ill-conditioned for them. */
 #include "worker.h"
 
 #include <math.h>
@@ -198,7 +198,7 @@ static bool is_far(const spread_system *s)
     return far;
 }
 
-int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2)
+int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2, double believed)
 {
     rough v;
     int made = 0;
@@ -208,6 +208,8 @@ int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2
         *stuck = !take_step(s, which, &v);
         made += !*stuck;
         if (*stuck)
+            break;
+        if (system_square(s) <= goal2 && goal2 >= believed * worse(s, s->known))
             break;
         if (is_far(s) || system_square(s) <= goal2) {
             const double told = fmax(system_square(s), CARRIED * CARRIED * worse(s, s->known));

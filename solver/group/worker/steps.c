@@ -252,13 +252,13 @@ static int make_steps(spread_system *s, int which, bool *flat, int most, double 
     return made;
 }
 
-int system_steps(spread_system *s, int which, bool *flat, int most, double goal2)
+int system_steps(spread_system *s, int which, bool *flat, int most, double goal2, double believed)
 {
     int made = 0;
     *flat = false;
     if (s->rough) {
         bool stuck;
-        made = rough_steps(s, which, &stuck, most, goal2);
+        made = rough_steps(s, which, &stuck, most, goal2, believed);
         if (!stuck)
             return made;
         s->single = false; /* K is too ill-conditioned for it, and was no better before */

@@ -122,9 +122,10 @@ void system_begin(spread_system *s, int which, bool u_is_zero);
 void system_settle(spread_system *s);
 /* r'z, of the worse lane. */
 double system_square(const spread_system *s);
-/* Steps of conjugate gradients until that is <= goal2; how many. *flat: the last one was not made, as p'K p was not
- * positive. */
-int system_steps(spread_system *s, int which, bool *flat, int most, double goal2);
+/* Steps of conjugate gradients until that is <= goal2; how many. In single precision that is believed where goal2 is at
+ * least `believed` times that of the last residual in double precision. *flat: the last one was not made, as p'K p was
+ * not positive. */
+int system_steps(spread_system *s, int which, bool *flat, int most, double goal2, double believed);
 
 /* ---- steps.c and rough.c share these */
 
@@ -142,6 +143,6 @@ void system_correct(spread_system *s, const variant *v, const uz_level_step *ste
 /* From s->r. */
 void rough_begin(spread_system *s, int which);
 /* Steps as system_steps has them. *stuck: single precision leads no further; what there is is settled. */
-int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2);
+int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2, double believed);
 
 #endif
