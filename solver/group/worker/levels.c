@@ -291,14 +291,15 @@ static void fetch_prolongation(spread_system *s)
     neighbours_fetch(near, count + here, count, sizeof *count);
     /* as many as the longest, so that all are alike */
     const size_t each = (size_t)most * (sizeof(int32_t) + (size_t)size * sizeof(float));
-    char *own = new_zeros(here, each), *others = new_zeros(near->ghosts, each);
-    for (int64_t s_ = 0; s_ < near->sent; s_++) {
-        const int64_t i = near->send[s_];
-        memcpy(own + (size_t)i * each, level->block + level->ptr[i], (size_t)count[i] * sizeof(int32_t));
-        memcpy(own + (size_t)i * each + (size_t)most * sizeof(int32_t), level->value + level->ptr[i] * size,
+    char *to = neighbours_room(near, each), *others = new_zeros(near->ghosts, each);
+    for (int64_t k = 0; k < near->sent; k++, to += each) {
+        const int64_t i = near->send[k];
+        memset(to, 0, each);
+        memcpy(to, level->block + level->ptr[i], (size_t)count[i] * sizeof(int32_t));
+        memcpy(to + (size_t)most * sizeof(int32_t), level->value + level->ptr[i] * size,
                (size_t)(count[i] * size) * sizeof(float));
     }
-    neighbours_fetch(near, others, own, each);
+    neighbours_exchange(near, others, each);
     int64_t total = level->ptr[here];
     for (int64_t g = 0; g < near->ghosts; g++)
         total += count[here + g];
@@ -316,7 +317,6 @@ static void fetch_prolongation(spread_system *s)
         level->ptr[here + g + 1] = at + count[here + g];
     }
     memset(value + total * size, 0, 8 * sizeof *value);
-    free(own);
     free(others);
     free(count);
 }

@@ -94,25 +94,36 @@ void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, co
         n->send[s] -= first[n->rank];
 }
 
-void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each)
+char *neighbours_room(neighbours *n, size_t each)
 {
-    int requests = 0;
     if (n->room < (size_t)n->sent * each) {
         free(n->packed);
         n->room = (size_t)n->sent * each;
         n->packed = new_zeros((int64_t)n->room, 1);
     }
+    return n->packed;
+}
+
+void neighbours_exchange(neighbours *n, void *ghosts, size_t each)
+{
+    int requests = 0;
     for (int p = 0; p < n->size; p++)
         if (n->take_count[p] > 0)
             MPI_Irecv((char *)ghosts + (size_t)n->take_first[p] * each, (int)((size_t)n->take_count[p] * each),
                       MPI_BYTE, p, 7, MPI_COMM_WORLD, &n->request[requests++]);
-    for (int64_t s = 0; s < n->sent; s++)
-        memcpy(n->packed + (size_t)s * each, (const char *)own + (size_t)n->send[s] * each, each);
     for (int p = 0; p < n->size; p++)
         if (n->send_count[p] > 0)
             MPI_Isend(n->packed + (size_t)n->send_first[p] * each, (int)((size_t)n->send_count[p] * each), MPI_BYTE, p,
                       7, MPI_COMM_WORLD, &n->request[requests++]);
     wait_for(requests, n->request);
+}
+
+void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each)
+{
+    char *packed = neighbours_room(n, each);
+    for (int64_t s = 0; s < n->sent; s++)
+        memcpy(packed + (size_t)s * each, (const char *)own + (size_t)n->send[s] * each, each);
+    neighbours_exchange(n, ghosts, each);
 }
 
 void neighbours_free(neighbours *n)

@@ -37,6 +37,9 @@ typedef struct {
 void neighbours_init(neighbours *n, const int32_t *first, const int64_t *ptr, const int32_t *column);
 /* ghosts' numbers of a node, `each` bytes, from those of the own nodes. */
 void neighbours_fetch(neighbours *n, void *ghosts, const void *own, size_t each);
+/* The same in two steps: room for `each` bytes of every node of `send`, which is to be filled, and the exchange. */
+char *neighbours_room(neighbours *n, size_t each);
+void neighbours_exchange(neighbours *n, void *ghosts, size_t each);
 void neighbours_free(neighbours *n);
 
 /* This process's part of the sweeps on a level that each has whole. */
