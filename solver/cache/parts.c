@@ -134,7 +134,7 @@ static uz_status keep(uz_cache *cache, uz_item *item, uz_factor *factor, const w
 }
 
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering, bool briefly,
                                uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err)
 {
     wanted w = {key, K, dofs, n_dofs, rows, ordering, hooks, .last = true};
@@ -170,7 +170,7 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
                 uz_table_expect(cache, item, predicted.bytes);
         }
         if (status == UZ_OK)
-            status = uz_factor_create(&factor, K, analysis, 0, hooks, err);
+            status = (briefly ? uz_factor_create_briefly : uz_factor_create)(&factor, K, analysis, 0, hooks, err);
         uz_table_release(cache, kept_analysis);
         uz_analysis_free(own_analysis);
         if (status == UZ_OK && cache)

@@ -25,10 +25,11 @@ typedef uz_status (*uz_factor_accept)(void *ctx, const uz_factor_info *predicted
 
 /* Finds a factor of K, one that ends with the contact's dofs (ascending) if it can, or makes one that does or that
  * serves `rows` rows on them as well (uz_analysis_create), with an analysis of the same pattern where there is one.
- * Where K is ill-conditioned only the factor is found that would be made. cache NULL: made, and freed on release; key
- * is then not read. Errors: uz_factor_create's. */
+ * Where K is ill-conditioned only the factor is found that would be made. briefly: one that is made is as by
+ * uz_factor_create_briefly; in a cache of its own. cache NULL: made, and freed on release; key is then not read.
+ * Errors: uz_factor_create's. */
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering, bool briefly,
                                uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err);
 void uz_shared_factor_release(uz_shared_factor *shared);
 

@@ -1,5 +1,6 @@
 /* condition.c: what the pivots of a factor and one linear solve with UZ_LANES random vectors say about K: an estimate
- * of its condition, and a bound on the norm of K^-1. Once per factor. */
+ * of its condition, and a bound on the norm of K^-1. Once per factor; of one that is used briefly the pivots alone, and
+ * one vector where somebody asks. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -35,7 +36,7 @@ static double add_squares(double squares[UZ_LANES], const double *X, int64_t n)
  * move, rounding was seen to leave up to half of n eps. */
 #define RCOND_LEAST DBL_EPSILON
 
-uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
+uz_status uz_find_least_pivot(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *perm = L->Perm;
@@ -52,12 +53,20 @@ uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *
             least = share < least || isnan(share) ? share : least;
         }
     factor->info.rcond = least;
+    factor->info.inverse_bound = INFINITY;
     if (!(least >= RCOND_LEAST * (double)n))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is singular to working precision (reciprocal condition %.2g): the body can move without "
                        "resistance, or its stiffnesses differ by more than double precision can hold",
                        least);
-    /* The pivots alone may be short by any factor (Kahan's matrix). */
+    return UZ_OK;
+}
+
+/* The pivots alone may be short by any factor (Kahan's matrix). */
+uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
+{
+    const SuiteSparse_long *perm = factor->L.Perm;
+    const int64_t n = factor->n;
     uint64_t state = 0x9E3779B97F4A7C15u;
     double half[UZ_LANES], whole[UZ_LANES], *root = uz_alloc(n, sizeof *root);
     const size_t entries = (size_t)(n * UZ_LANES);
@@ -87,5 +96,33 @@ uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *
     }
     cholmod_l_free(2 * entries, sizeof *X, X, common);
     free(root);
+    return status;
+}
+
+/* Of one of the vectors above. */
+uz_status uz_factor_estimate_rcond(double *rcond, const uz_factor *factor, const uz_csc *K, uz_error *err)
+{
+    const SuiteSparse_long *perm = factor->L.Perm;
+    const int64_t n = factor->n;
+    uint64_t state = 0x9E3779B97F4A7C15u;
+    double half = 0.0, whole = 0.0, *x = uz_alloc(n, sizeof *x);
+    uz_factor_workspace *ws = uz_factor_workspace_new();
+    uz_status status =
+        x && ws ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
+    *rcond = factor->info.rcond;
+    for (int64_t k = 0; status == UZ_OK && k < n; k++)
+        x[k] = sqrt(K->val[K->ptr[perm[k]]]) * (2.0 * uz_uniform(&state) - 1.0);
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(factor, ws, x, true, err);
+    for (int64_t k = 0; status == UZ_OK && k < n; k++)
+        half += x[k] * x[k];
+    if (status == UZ_OK)
+        status = uz_factor_solve_one(factor, ws, x, false, err);
+    for (int64_t k = 0; status == UZ_OK && k < n; k++)
+        whole += K->val[K->ptr[perm[k]]] * x[k] * x[k];
+    if (status == UZ_OK && half / whole < *rcond)
+        *rcond = half / whole;
+    uz_factor_workspace_free(ws);
+    free(x);
     return status;
 }

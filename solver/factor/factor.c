@@ -119,8 +119,8 @@ uz_status uz_factor_new(uz_factor **out, const uz_analysis *analysis, uz_error *
     return UZ_OK;
 }
 
-uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
-                           const uz_hooks *hooks, uz_error *err)
+static uz_status create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
+                        bool briefly, const uz_hooks *hooks, uz_error *err)
 {
     *out = NULL;
     if (K->rows != K->cols || K->cols != analysis->n || K->ptr[K->cols] != analysis->nnz)
@@ -156,6 +156,8 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
         cholmod_l_free_sparse(&S, &common);
     }
     if (status == UZ_OK)
+        status = uz_find_least_pivot(factor, K, err);
+    if (status == UZ_OK && !briefly)
         status = uz_find_condition(factor, K, &common, err);
     factor->info.factor_s = uz_seconds() - start;
     cholmod_l_finish(&common);
@@ -164,6 +166,18 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     else
         uz_factor_free(factor);
     return status;
+}
+
+uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
+                           const uz_hooks *hooks, uz_error *err)
+{
+    return create(out, K, analysis, memory_limit, false, hooks, err);
+}
+
+uz_status uz_factor_create_briefly(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
+                                   const uz_hooks *hooks, uz_error *err)
+{
+    return create(out, K, analysis, memory_limit, true, hooks, err);
 }
 
 void uz_factor_free(uz_factor *factor)

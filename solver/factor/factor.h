@@ -60,6 +60,11 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis);
  * predicted bytes, ARGUMENT another size or number of entries than the analysis's. */
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err);
+/* The same of a K that is solved with a few times: its rcond is that of the pivots alone, and inverse_bound unknown. */
+uz_status uz_factor_create_briefly(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
+                                   const uz_hooks *hooks, uz_error *err);
+/* An estimate of K's rcond, as in uz_factor_info, by one linear solve. UZ_ERR_MEMORY. */
+uz_status uz_factor_estimate_rcond(double *rcond, const uz_factor *factor, const uz_csc *K, uz_error *err);
 /* A factor without numbers, which nobody shares: of use once uz_factor_again has made them. Its condition stays
  * unknown. UZ_ERR_MEMORY. */
 uz_status uz_factor_new(uz_factor **out, const uz_analysis *analysis, uz_error *err);

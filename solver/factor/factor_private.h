@@ -110,7 +110,9 @@ uz_status uz_paths_solve(double *v, uz_paths *x, uz_error *err);
  * memory. */
 double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);
 
-/* Fills info.inverse_bound and info.rcond. UZ_ERR_NOT_SPD where K is singular to working precision. */
+/* Fills info.rcond. UZ_ERR_NOT_SPD where K is singular to working precision. */
+uz_status uz_find_least_pivot(uz_factor *factor, const uz_csc *K, uz_error *err);
+/* After it: info.inverse_bound, and info.rcond may become less. */
 uz_status uz_find_condition(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err);
 
 /* Gives ws->panel at least `need` entries. */

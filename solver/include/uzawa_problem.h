@@ -107,6 +107,8 @@ typedef struct {
     int64_t max_iterations; /* >= 0 */
     double time_limit_s;    /* of the whole solve; INFINITY: none */
     bool semidefinite;      /* matrices: K is meant to be singular, its eigenvalues within rounding of 0 being 0 */
+    bool step;              /* matrices: on the way to an answer that has a certificate of its own. What the method
+                             * solves exactly, on a factor, gets none: its numbers are NaN. rcond is a rough estimate */
     size_t memory_limit; /* bytes for all of a solve; 0: none. AUTO goes on without a factor where one does not fit */
 } uz_settings;
 /* auto, certified 1e-8, 100000 iterations, no time limit. */

@@ -477,6 +477,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     run->K = K;
     if (found != UZ_OK)
         return found;
+    run->settings.step = !(run->norm < CHORD_STEP); /* from there on each digit counts */
     const double stiffest = run->stiffest;
     const bool roughly = was_large(run);
     addition add = {.hold = roughly ? 0 : run->hold, .shift = run->shift / LESS_SHIFT};
@@ -881,6 +882,8 @@ static uz_status follow_chords(bool *done, uz_part *out, uz_finite_run *run, dou
     double *r = uz_alloc(run->n_r, sizeof *r);
     uz_status status = r ? uz_finite_acquire(&setup, run, &run->trial, err)
                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld reactions", (long long)run->n_r);
+    if (status == UZ_OK && run->settings.step && setup->factor) /* that of the last contact problem is told */
+        status = uz_factor_estimate_rcond(&run->last->summary.rcond, setup->factor, run->K, err);
     for (int k = MOST_CHORDS; status == UZ_OK && goes_on && k > 0; k--) {
         double now;
         status = uz_finite_chord(&goes_on, &now, to, r, run, setup, err);

@@ -297,7 +297,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, uz_
                 status = uz_matrix_digest(key, cache, m.K, err);
             if (status == UZ_OK)
                 status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,
-                                              accept_factor, &m, hooks, err);
+                                              settings->step, accept_factor, &m, hooks, err);
             done = status != UZ_ERR_LIMIT || is_chosen(plan, m.direct);
             if (!done)
                 status = UZ_OK; /* the plan speaks for another form now, or for none */

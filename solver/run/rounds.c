@@ -104,9 +104,12 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
                 status = uz_run_start(&run, &own);
             if (status == UZ_OK)
                 status = uz_run_iterate(&run, &own);
-            if (status == UZ_OK)
+            bool solved = false;
+            if (status == UZ_OK && settings->step)
+                status = uz_run_hand_over(&run, &solved, &own);
+            if (status == UZ_OK && !solved)
                 status = uz_run_certify(&run, &own);
-            if (status == UZ_OK)
+            if (status == UZ_OK && !solved)
                 status = uz_run_finish(&run, &own);
             status = close_case(&run, &b, status, &own);
             uz_run_end(&run);

@@ -322,6 +322,29 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
     return uz_report_run(run, err);
 }
 
+uz_status uz_run_hand_over(uz_run *run, bool *solved, uz_error *err)
+{
+    const uz_iterate *it = &run->work.it;
+    const uz_dual_load *load = run->work.dual;
+    uz_answer *answer = &run->answer;
+    uz_summary *summary = &run->result->summary;
+    uz_status status = UZ_OK;
+    for (int round = 1; status == UZ_OK && run->work.end == UZ_END_NEXT && round < MAX_ROUNDS; round++)
+        status = uz_run_iterate(run, err);
+    *solved = run->asked->setup->factor && (run->work.end == UZ_END_SOLVED || run->m == 0);
+    if (status == UZ_OK && *solved)
+        status = uz_run_recover(run, answer, it->r, false, err);
+    if (status != UZ_OK || !*solved)
+        return status;
+    for (int64_t i = 0; i < run->m; i++)
+        answer->g[i] = (load->g0[i] - it->Dr[i]) / load->dual->row_scale[i];
+    memset(&answer->certificate, 0xff, sizeof answer->certificate); /* every byte set is a NaN */
+    uz_run_restore_units(run);
+    summary->certificate = answer->certificate;
+    summary->outcome = UZ_CONVERGED;
+    return uz_report_run(run, err);
+}
+
 void uz_run_end(uz_run *run)
 {
     uz_ahead_free(run->work.ahead);

@@ -89,6 +89,8 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err);
 uz_status uz_run_certify(uz_run *run, uz_error *err);
 /* Further rounds while the certificate asks for them, refinement, all rows; then the report. */
 uz_status uz_run_finish(uz_run *run, uz_error *err);
+/* Instead of both, for uz_settings.step: the last answer as it is, if the iterations have *solved for it exactly. */
+uz_status uz_run_hand_over(uz_run *run, bool *solved, uz_error *err);
 void uz_run_end(uz_run *run);
 
 /* ---- units in which squares neither over- nor underflow (scale.c) */

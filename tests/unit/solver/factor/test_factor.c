@@ -505,6 +505,16 @@ TEST(inverse_norm_is_an_upper_bound)
         }
         CHECK(uz_factor_describe(factor).rcond >= (1 - 1e-6) / worst);
         CHECK_MSG(bound >= worst && bound <= 200 * worst, "n %d: bound %g, norm at least %g", (int)n, bound, worst);
+        uz_analysis *analysis = uz_factor_analysis(factor);
+        uz_factor *brief;
+        CHECK_INT(uz_factor_create_briefly(&brief, &K, analysis, 0, NULL, &err), UZ_OK);
+        CHECK(isinf(uz_factor_describe(brief).inverse_bound));
+        double rcond = NAN;
+        CHECK_INT(uz_factor_estimate_rcond(&rcond, brief, &K, &err), UZ_OK);
+        CHECK(rcond >= (1 - 1e-6) / worst && rcond <= uz_factor_describe(brief).rcond);
+        CHECK_MSG(rcond <= 1e3 / worst, "n %d: %g, of %g", (int)n, rcond, 1 / worst);
+        uz_factor_free(brief);
+        uz_analysis_free(analysis);
         free(dense);
         free(x);
         free(L);

@@ -3,6 +3,7 @@
 #include "harness.h"
 #include "qp_fixture.h"
 #include "quad_exact.h"
+#include "run/solve.h"
 
 /* In tests/data/qp. */
 static const char *const copied_cases[] = {"FC_CubeH8", "FC_SpheresInBox", "MM_HS118",      "MM_HS21",      "MM_HS268",
@@ -268,4 +269,36 @@ TEST(indefinite_stiffness_is_refused)
             CHECK_STR(err.where, "K");
         }
     uz_problem_clear(&problem);
+}
+
+/* What the active set has solved is the answer, which a step has without what is told of its error. */
+TEST(a_step_is_the_answer_without_a_certificate)
+{
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        qp_random rng = {seed};
+        uz_problem problem = problem_of(random_obstacle(&rng, 60, 1 + (int64_t)(seed % 4)));
+        uz_result *whole = NULL, *step = NULL;
+        uz_settings settings = uz_settings_default();
+        uz_error err = {0};
+        CHECK_INT(uz_solve_rounds(&whole, &problem, &settings, NULL, NULL, NULL, NULL, &err), UZ_OK);
+        settings.step = true;
+        CHECK_INT(uz_solve_rounds(&step, &problem, &settings, NULL, NULL, NULL, NULL, &err), UZ_OK);
+        CHECK(whole->summary.outcome == UZ_CONVERGED && step->summary.outcome == UZ_CONVERGED);
+        CHECK(isfinite(whole->summary.certificate.relative_error));
+        CHECK(isnan(step->summary.certificate.relative_error) && isnan(step->summary.certificate.absolute_error));
+        double most = 0, force = 0;
+        for (int64_t j = 0; j < whole->d; j++)
+            most = fmax(most, fabs(whole->u[j]));
+        for (int64_t i = 0; i < whole->m; i++)
+            force = fmax(force, fabs(whole->r[i]));
+        for (int64_t j = 0; j < whole->d; j++)
+            CHECK(fabs(step->u[j] - whole->u[j]) <= 1e-10 * most);
+        for (int64_t i = 0; i < whole->m; i++) {
+            CHECK(fabs(step->r[i] - whole->r[i]) <= 1e-9 * force);
+            CHECK(fabs(step->g[i] - whole->g[i]) <= 1e-10 * most);
+        }
+        uz_result_free(whole);
+        uz_result_free(step);
+        uz_problem_clear(&problem);
+    }
 }
