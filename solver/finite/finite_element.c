@@ -18,7 +18,7 @@
 
 #include "core/cpu.h"
 #include "element/lane_shape.h"
-#include "finite/hyperelastic.h"
+#include "finite/hyperelastic_lanes.h"
 
 #include <math.h>
 #include <string.h>
@@ -142,9 +142,11 @@ static double orientation(double F[3][3], int dim)
            F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
 }
 
+/* Of the components of a strain. */
+static const int AXIS[N_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+
 static void cauchy_green(double C[N_STRAINS], double F[3][3], int dim)
 {
-    static const int AXIS[N_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
     for (int c = 0; c < N_STRAINS; c++) {
         const int i = AXIS[c][0], j = AXIS[c][1];
         C[c] = dim == 2 && c > 3 ? 0 : F[0][i] * F[0][j] + F[1][i] * F[1][j] + F[2][i] * F[2][j];
@@ -192,6 +194,46 @@ static bool law_at(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS
     for (int i = 0; i < n; i++)
         D[i][2] = D[2][i] = 0;
     S[2] = 0;
+    return true;
+}
+
+/* What a law says at Gauss points. */
+typedef struct {
+    double W[POINTS], S[N_STRAINS][POINTS], D[N_STRAINS][N_STRAINS][POINTS];
+} law_points;
+
+/* At all Gauss points, but of plane stress, whose F is not known across the plane. False: det C <= 0 at one. */
+UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, gradients H, double across, bool tangent,
+                         uz_elasticity law, uz_lame lame, int dim, bool ring)
+{
+    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        bool good;
+        four F[3][3], C[N_STRAINS], W, S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) {
+                F[i][j] = (four){0} + (i == j);
+                if ((i < dim && j < dim) || (ring && i + j == 4))
+                    F[i][j] += *four_from(&H[i][j][p]);
+            }
+        F[2][2] += across;
+        for (int c = 0; c < N_STRAINS; c++) {
+            const int i = AXIS[c][0], j = AXIS[c][1];
+            C[c] = (four){0};
+            for (int k = 0; k < 3 && (dim == 3 || c < UZ_FINITE_PLANE_STRAINS); k++)
+                C[c] += F[k][i] * F[k][j];
+        }
+        const int count = rule->gauss - p < LANES ? rule->gauss - p : LANES;
+        uz_law_in_lanes(&good, &W, S, tangent ? D : NULL, n, count, law, lame.lambda, lame.mu, C);
+        if (!good)
+            return false;
+        *four_at(&out->W[p]) = W;
+        for (int i = 0; i < n; i++) {
+            *four_at(&out->S[i][p]) = S[i];
+            for (int j = 0; j < n && tangent; j++)
+                *four_at(&out->D[i][j][p]) = D[i][j];
+        }
+    }
     return true;
 }
 
@@ -359,6 +401,7 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
     uz_finite_forces *out = x->out;
     shape rest;
     gradients H, of_step;
+    law_points laws;
     points at;
     four force[3][UZ_ELEMENT_NODES / LANES] = {{{0}}};
     const uz_model model = x->element->model;
@@ -374,15 +417,31 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
         F[2][2] += dim == 2 && !ring ? x->element->across : 0;
         out->least_det = fmin(out->least_det, orientation(F, dim));
     }
+    const double across = dim == 2 && !ring ? x->element->across : 0;
+    const bool settles = model == UZ_PLANE_STRESS;
+    if (!(out->least_det > 0) || (!settles && !find_laws(&laws, rule, H, across, tangent, x->law, lame, dim, ring))) {
+        out->least_det = fmin(out->least_det, 0);
+        return false;
+    }
     for (int g = 0; g < rule->gauss; g++) {
+        const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
         double F[3][3], W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
         const double volume = rest.volume[g];
         deformation(F, H, g, dim, ring);
-        F[2][2] += dim == 2 && !ring ? x->element->across : 0;
-        cauchy_green(C, F, dim);
-        if (!(out->least_det > 0) || !law_at(&W, S, tangent ? D : NULL, F, C, model, lame, x->law)) {
-            out->least_det = fmin(out->least_det, 0); /* also where no stretch across a plane is without stress */
-            return false;
+        F[2][2] += across;
+        if (settles) {
+            cauchy_green(C, F, dim);
+            if (!law_at(&W, S, D, F, C, model, lame, x->law)) {
+                out->least_det = 0; /* no stretch across the plane is without stress */
+                return false;
+            }
+        } else {
+            W = laws.W[g];
+            for (int i = 0; i < n; i++) {
+                S[i] = laws.S[i][g];
+                for (int j = 0; j < n && tangent; j++)
+                    D[i][j] = laws.D[i][j][g];
+            }
         }
         out->energy += volume * W;
         slopes_of_nodes(&at, rule, &rest, g, dim, wide, ring);
@@ -494,7 +553,6 @@ bool uz_finite_law(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
                         const double point[3])
 {
-    static const int AXIS[N_STRAINS][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
     double F[3][3], C[N_STRAINS], W, S[N_STRAINS] = {0}, D[N_STRAINS][N_STRAINS];
     const bool ring = element->model == UZ_AXISYMMETRIC;
     uz_finite_rule rule;
