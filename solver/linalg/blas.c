@@ -287,10 +287,12 @@ bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel,
     return true;
 }
 
+enum { TRIANGLE_PANEL = 24 }; /* what is narrower spares more of the other triangle's zeros */
+
 /* X = L^-1 by panels of columns, then X'X by panels of rows of X. */
 bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_stop *stop)
 {
-    int64_t width = panel_width(n);
+    int64_t width = least_of(panel_width(n), TRIANGLE_PANEL);
     if (!uz_clear_while(n * n, A, stop) || !uz_clear_while(n * n, X, stop))
         return false;
     for (int64_t k = 0; k < n; k += width) {
