@@ -119,8 +119,22 @@ UZ_INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const sha
         double moved = 0;
         for (int a = 0; a < rule->nodes; a++)
             moved += rule->at_nodes[p][3][a] * u[2 * a];
+        if (p % LANES == 0)
+            *four_at(&H[2][2][p]) = (four){0};
         H[2][2][p] = at->per_radius[p] > 0 ? moved * at->per_radius[p] : H[0][0][p];
     }
+}
+
+/* F of four points; across: what warmth adds to it there. */
+UZ_INLINE void deformations(four F[3][3], gradients H, int p, double across, int dim, bool ring)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            F[i][j] = (four){0} + (i == j);
+            if ((i < dim && j < dim) || (ring && i + j == 4))
+                F[i][j] += *four_from(&H[i][j][p]);
+        }
+    F[2][2] += across;
 }
 
 /* In the plane the last of F is the stretch across it, which is 1 but in rings, and where the element is warm. */
@@ -210,13 +224,7 @@ UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, gradients 
     for (int p = 0; p < rule->gauss; p += LANES) {
         bool good;
         four F[3][3], C[N_STRAINS], W, S[N_STRAINS], D[N_STRAINS][N_STRAINS];
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) {
-                F[i][j] = (four){0} + (i == j);
-                if ((i < dim && j < dim) || (ring && i + j == 4))
-                    F[i][j] += *four_from(&H[i][j][p]);
-            }
-        F[2][2] += across;
+        deformations(F, H, p, across, dim, ring);
         for (int c = 0; c < N_STRAINS; c++) {
             const int i = AXIS[c][0], j = AXIS[c][1];
             C[c] = (four){0};
@@ -235,6 +243,43 @@ UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, gradients 
         }
     }
     return true;
+}
+
+/* The same of plane stress, point by point; false also where no stretch across the plane is without stress. */
+static bool settle_laws(law_points *out, const uz_finite_rule *rule, gradients H, uz_elasticity law, uz_lame lame)
+{
+    for (int g = 0; g < rule->gauss; g++) {
+        double F[3][3], C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+        deformation(F, H, g, 2, false);
+        cauchy_green(C, F, 2);
+        if (!law_at(&out->W[g], S, D, F, C, UZ_PLANE_STRESS, lame, law))
+            return false;
+        for (int i = 0; i < UZ_FINITE_PLANE_STRAINS; i++) {
+            out->S[i][g] = S[i];
+            for (int j = 0; j < UZ_FINITE_PLANE_STRAINS; j++)
+                out->D[i][j][g] = D[i][j];
+        }
+    }
+    return true;
+}
+
+/* The least of what orientation says of each point. */
+UZ_INLINE void look_at_orientation(double *least, const uz_finite_rule *rule, gradients H, double across, int dim,
+                                   bool ring)
+{
+    for (int p = 0; p < rule->points; p += LANES) {
+        four F[3][3];
+        deformations(F, H, p, across, dim, ring);
+        four det = F[0][0] * F[1][1] - F[0][1] * F[1][0];
+        det *= F[2][2];
+        if (dim == 3)
+            det += F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]) - F[0][0] * F[1][2] * F[2][1] +
+                   F[0][1] * F[1][2] * F[2][0];
+        for (int l = 0; l < LANES && p + l < rule->points; l++) {
+            const double own = dim == 3 || F[2][2][l] > 0 ? det[l] : -fabs(det[l]);
+            *least = own < *least ? own : *least;
+        }
+    }
 }
 
 /* ---- one point */
@@ -269,20 +314,49 @@ UZ_INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const sh
     }
 }
 
-/* force[axis][node] += what the stress does, P = F S. */
-UZ_INLINE void add_forces(four force[3][UZ_ELEMENT_NODES / LANES], double G[4][UZ_ELEMENT_NODES], double F[3][3],
-                          const double *S, double volume, int dim, int wide, bool ring)
+/* force[axis][node]: what the stress does, P = F S: of each point Q = P by local coordinates, times the slopes by
+ * these. */
+UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_points *laws, const uz_finite_rule *rule,
+                           gradients H, const shape *at, double across, int dim, int wide, bool ring)
 {
     for (int i = 0; i < dim; i++)
-        for (int J = 0; J < dim; J++) {
-            double P = 0;
-            for (int M = 0; M < dim; M++)
-                P += F[i][M] * S[COMPONENT[J][M]];
-            for (int w = 0; w < wide; w++)
-                force[i][w] += volume * P * *four_from(&G[J][LANES * w]);
+        for (int w = 0; w < wide; w++)
+            force[i][w] = (four){0};
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        four F[3][3], Q[3][3], around = {0};
+        const four volume = *four_from(&at->volume[p]);
+        deformations(F, H, p, across, dim, ring);
+        for (int i = 0; i < dim; i++) {
+            four P[3] = {{0}};
+            for (int J = 0; J < dim; J++) {
+                P[J] = F[i][0] * *four_from(&laws->S[COMPONENT[J][0]][p]);
+                for (int M = 1; M < dim; M++)
+                    P[J] += F[i][M] * *four_from(&laws->S[COMPONENT[J][M]][p]);
+            }
+            if (ring && i == 0) { /* on the axis u_r / r is the derivative along r */
+                const four hoop = F[2][2] * *four_from(&laws->S[2][p]), per_radius = *four_from(&at->per_radius[p]);
+                around = volume * hoop * per_radius;
+                four along = hoop;
+                for (int l = 0; l < LANES; l++)
+                    along[l] = per_radius[l] > 0 ? 0 : along[l];
+                P[0] += along;
+            }
+            for (int l = 0; l < dim; l++) {
+                Q[i][l] = P[0] * *four_from(&at->inverse[l][0][p]);
+                for (int J = 1; J < dim; J++)
+                    Q[i][l] += P[J] * *four_from(&at->inverse[l][J][p]);
+                Q[i][l] *= volume;
+            }
         }
-    for (int w = 0; w < wide && ring; w++)
-        force[0][w] += volume * F[2][2] * S[2] * *four_from(&G[3][LANES * w]);
+        for (int g = p; g < p + LANES && g < rule->gauss; g++)
+            for (int w = 0; w < wide; w++) {
+                for (int i = 0; i < dim; i++)
+                    for (int l = 0; l < dim; l++)
+                        force[i][w] += Q[i][l][g - p] * *four_from(&rule->at_nodes[g][l][LANES * w]);
+                if (ring)
+                    force[0][w] += around[g - p] * *four_from(&rule->at_nodes[g][3][LANES * w]);
+            }
+    }
 }
 
 /* A_iJkL = F_iM D_JMLN F_kN + T_JL (i = k), T the stress that turns with the body. */
@@ -403,53 +477,38 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
     gradients H, of_step;
     law_points laws;
     points at;
-    four force[3][UZ_ELEMENT_NODES / LANES] = {{{0}}};
+    four force[3][UZ_ELEMENT_NODES / LANES];
     const uz_model model = x->element->model;
     const uz_lame lame = uz_lame_in_space(model, x->element->lame);
-    const bool tangent = x->ke || model == UZ_PLANE_STRESS;
     shape_of(&rest, rule, x->element, dim, ring);
     find_gradients(H, rule, &rest, x->u, dim, ring);
     if (x->ke && x->step)
         find_gradients(of_step, rule, &rest, x->step, dim, ring);
-    for (int p = 0; p < rule->points; p++) {
-        double F[3][3];
-        deformation(F, H, p, dim, ring);
-        F[2][2] += dim == 2 && !ring ? x->element->across : 0;
-        out->least_det = fmin(out->least_det, orientation(F, dim));
-    }
     const double across = dim == 2 && !ring ? x->element->across : 0;
-    const bool settles = model == UZ_PLANE_STRESS;
-    if (!(out->least_det > 0) || (!settles && !find_laws(&laws, rule, H, across, tangent, x->law, lame, dim, ring))) {
+    look_at_orientation(&out->least_det, rule, H, across, dim, ring);
+    if (!(out->least_det > 0) ||
+        !(model == UZ_PLANE_STRESS ? settle_laws(&laws, rule, H, x->law, lame)
+                                   : find_laws(&laws, rule, H, across, x->ke, x->law, lame, dim, ring))) {
         out->least_det = fmin(out->least_det, 0);
         return false;
     }
-    for (int g = 0; g < rule->gauss; g++) {
+    find_forces(force, &laws, rule, H, &rest, across, dim, wide, ring);
+    for (int g = 0; g < rule->gauss; g++)
+        out->energy += rest.volume[g] * laws.W[g];
+    for (int g = 0; g < rule->gauss && x->ke; g++) {
         const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
-        double F[3][3], W, C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
-        const double volume = rest.volume[g];
+        double F[3][3], S[N_STRAINS], D[N_STRAINS][N_STRAINS], T[N_STRAINS];
         deformation(F, H, g, dim, ring);
         F[2][2] += across;
-        if (settles) {
-            cauchy_green(C, F, dim);
-            if (!law_at(&W, S, D, F, C, model, lame, x->law)) {
-                out->least_det = 0; /* no stretch across the plane is without stress */
-                return false;
-            }
-        } else {
-            W = laws.W[g];
-            for (int i = 0; i < n; i++) {
-                S[i] = laws.S[i][g];
-                for (int j = 0; j < n && tangent; j++)
-                    D[i][j] = laws.D[i][j][g];
-            }
+        for (int i = 0; i < n; i++) {
+            S[i] = laws.S[i][g];
+            for (int j = 0; j < n; j++)
+                D[i][j] = laws.D[i][j][g];
         }
-        out->energy += volume * W;
         slopes_of_nodes(&at, rule, &rest, g, dim, wide, ring);
-        add_forces(force, at.G[g], F, S, volume, dim, wide, ring);
-        if (x->ke && x->step)
+        if (x->step)
             stress_before(T, S, D, of_step, g, dim, ring);
-        if (x->ke)
-            moduli(at.A[g], F, D, x->step ? T : S, volume, dim, ring);
+        moduli(at.A[g], F, D, x->step ? T : S, rest.volume[g], dim, ring);
     }
     for (int a = 0; a < rule->nodes; a++)
         for (int i = 0; i < dim; i++)
