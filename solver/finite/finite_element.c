@@ -17,128 +17,37 @@
 #include "finite/finite_element.h"
 
 #include "core/cpu.h"
-#include "element/lane_shape.h"
 #include "finite/hyperelastic_lanes.h"
+#include "finite/point_lanes.h"
 
 #include <math.h>
 #include <string.h>
 
 /* NODES: the most, by fours; AROUND: the derivative of what is around the axis, after those in the plane. */
 enum { N_STRAINS = UZ_FINITE_STRAINS, LANES = UZ_FINITE_LANES, POINTS = UZ_FINITE_POINTS, AROUND = 4 };
-typedef double four __attribute__((vector_size(8 * UZ_FINITE_LANES), aligned(8), may_alias));
-
-/* Four numbers in a row. */
-UZ_INLINE const four *four_from(const double *x)
-{
-    return (const four *)x;
-}
-
-UZ_INLINE four *four_at(double *x)
-{
-    return (four *)x;
-}
+typedef uz_four four;
 
 /* Steps to the stretch across the plane, when its square is there to rounding, and the least one that is looked for. */
 enum { MOST_SETTLING = 60 };
 #define SETTLED         1e-13
 #define LEAST_THICKNESS 1e-8
-#define TWO_PI          6.28318530717958647693
 
 /* ---- at all points, four at a time */
 
-/* Before anything moves: derivatives of local coordinates by places [local][x], what a Gauss point stands for, and of
- * rings 1 / r, which is 0 on the axis. */
-typedef struct {
-    double inverse[3][3][POINTS], volume[POINTS], per_radius[POINTS];
-} shape;
-
-/* H[c][j]: the derivative of u_c by x_j; of rings [2][2] is u_r / r, in the plane else the others with a 2 are 0. */
-typedef double gradients[3][3][POINTS];
-
-/* D[c][i]: derivatives by local coordinates at four points from `first` on, of values (nodes x dim), against those of
- * the first node: a translation leaves no rounding. */
-UZ_INLINE void differentiate(four D[3][3], const uz_finite_rule *rule, const double *value, int first, int dim)
-{
-    for (int c = 0; c < dim; c++)
-        for (int i = 0; i < dim; i++)
-            D[c][i] = (four){0};
-    for (int a = 1; a < rule->nodes; a++)
-        for (int i = 0; i < dim; i++) {
-            const four slope = *four_from(&rule->at_points[a][i][first]);
-            for (int c = 0; c < dim; c++)
-                D[c][i] += slope * (value[dim * a + c] - value[c]);
-        }
-}
-
-/* Of rings: volumes by the way around, and 1 / r. */
-UZ_INLINE void find_radii(shape *out, const uz_finite_rule *rule, const double *xyz)
-{
-    double largest = 0;
-    for (int a = 0; a < rule->nodes; a++)
-        largest = fmax(largest, fabs(xyz[2 * a]));
-    for (int p = 0; p < rule->points; p++) {
-        double radius = 0;
-        for (int a = 0; a < rule->nodes; a++)
-            radius += rule->at_nodes[p][3][a] * xyz[2 * a];
-        out->per_radius[p] = radius > UZ_AXIS * largest ? 1 / radius : 0;
-        out->volume[p] *= TWO_PI * radius;
-    }
-}
-
-UZ_INLINE void shape_of(shape *out, const uz_finite_rule *rule, const uz_element *element, int dim, bool ring)
-{
-    for (int p = 0; p < rule->points; p += LANES) {
-        four X[3][3], inverse[3][3], det;
-        differentiate(X, rule, element->xyz, p, dim);
-        uz_lane_invert(inverse, &det, X, dim);
-        for (int i = 0; i < dim; i++)
-            for (int j = 0; j < dim; j++)
-                *four_at(&out->inverse[i][j][p]) = inverse[j][i];
-        const double thick = dim == 2 && !ring ? element->thickness : 1;
-        *four_at(&out->volume[p]) = *four_from(&rule->weight[p]) * det * thick;
-    }
-    if (ring)
-        find_radii(out, rule, element->xyz);
-}
-
-UZ_INLINE void find_gradients(gradients H, const uz_finite_rule *rule, const shape *at, const double *u, int dim,
-                              bool ring)
-{
-    for (int p = 0; p < rule->points; p += LANES) {
-        four D[3][3];
-        differentiate(D, rule, u, p, dim);
-        for (int c = 0; c < dim; c++)
-            for (int j = 0; j < dim; j++) {
-                four sum = D[c][0] * *four_from(&at->inverse[0][j][p]);
-                for (int i = 1; i < dim; i++)
-                    sum += D[c][i] * *four_from(&at->inverse[i][j][p]);
-                *four_at(&H[c][j][p]) = sum;
-            }
-    }
-    for (int p = 0; p < rule->points && ring; p++) {
-        double moved = 0;
-        for (int a = 0; a < rule->nodes; a++)
-            moved += rule->at_nodes[p][3][a] * u[2 * a];
-        if (p % LANES == 0)
-            *four_at(&H[2][2][p]) = (four){0};
-        H[2][2][p] = at->per_radius[p] > 0 ? moved * at->per_radius[p] : H[0][0][p];
-    }
-}
-
 /* F of four points; across: what warmth adds to it there. */
-UZ_INLINE void deformations(four F[3][3], gradients H, int p, double across, int dim, bool ring)
+UZ_INLINE void deformations(four F[3][3], uz_gradients H, int p, double across, int dim, bool ring)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             F[i][j] = (four){0} + (i == j);
             if ((i < dim && j < dim) || (ring && i + j == 4))
-                F[i][j] += *four_from(&H[i][j][p]);
+                F[i][j] += *uz_four_from(&H[i][j][p]);
         }
     F[2][2] += across;
 }
 
 /* In the plane the last of F is the stretch across it, which is 1 but in rings, and where the element is warm. */
-UZ_INLINE void deformation(double F[3][3], gradients H, int p, int dim, bool ring)
+UZ_INLINE void deformation(double F[3][3], uz_gradients H, int p, int dim, bool ring)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
@@ -217,7 +126,7 @@ typedef struct {
 } law_points;
 
 /* At all Gauss points, but of plane stress, whose F is not known across the plane. False: det C <= 0 at one. */
-UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, gradients H, double across, bool tangent,
+UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, uz_gradients H, double across, bool tangent,
                          uz_elasticity law, uz_lame lame, int dim, bool ring)
 {
     const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
@@ -235,18 +144,18 @@ UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, gradients 
         uz_law_in_lanes(&good, &W, S, tangent ? D : NULL, n, count, law, lame.lambda, lame.mu, C);
         if (!good)
             return false;
-        *four_at(&out->W[p]) = W;
+        *uz_four_at(&out->W[p]) = W;
         for (int i = 0; i < n; i++) {
-            *four_at(&out->S[i][p]) = S[i];
+            *uz_four_at(&out->S[i][p]) = S[i];
             for (int j = 0; j < n && tangent; j++)
-                *four_at(&out->D[i][j][p]) = D[i][j];
+                *uz_four_at(&out->D[i][j][p]) = D[i][j];
         }
     }
     return true;
 }
 
 /* The same of plane stress, point by point; false also where no stretch across the plane is without stress. */
-static bool settle_laws(law_points *out, const uz_finite_rule *rule, gradients H, uz_elasticity law, uz_lame lame)
+static bool settle_laws(law_points *out, const uz_finite_rule *rule, uz_gradients H, uz_elasticity law, uz_lame lame)
 {
     for (int g = 0; g < rule->gauss; g++) {
         double F[3][3], C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS];
@@ -264,7 +173,7 @@ static bool settle_laws(law_points *out, const uz_finite_rule *rule, gradients H
 }
 
 /* The least of what orientation says of each point. */
-UZ_INLINE void look_at_orientation(double *least, const uz_finite_rule *rule, gradients H, double across, int dim,
+UZ_INLINE void look_at_orientation(double *least, const uz_finite_rule *rule, uz_gradients H, double across, int dim,
                                    bool ring)
 {
     for (int p = 0; p < rule->points; p += LANES) {
@@ -296,45 +205,46 @@ typedef struct {
     double A[UZ_ELEMENT_GAUSS][COMPONENTS][PADDED];
 } points;
 
-UZ_INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const shape *at, int p, int dim, int wide,
+UZ_INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const uz_rest *at, int p, int dim, int wide,
                                bool ring)
 {
     double(*G)[UZ_ELEMENT_NODES] = out->G[p];
     for (int w = 0; w < LANES * wide; w += LANES) {
         for (int j = 0; j < dim; j++) {
-            four sum = *four_from(&rule->at_nodes[p][0][w]) * at->inverse[0][j][p];
+            four sum = *uz_four_from(&rule->at_nodes[p][0][w]) * at->inverse[0][j][p];
             for (int i = 1; i < dim; i++)
-                sum += *four_from(&rule->at_nodes[p][i][w]) * at->inverse[i][j][p];
-            *four_at(&G[j][w]) = sum;
+                sum += *uz_four_from(&rule->at_nodes[p][i][w]) * at->inverse[i][j][p];
+            *uz_four_at(&G[j][w]) = sum;
         }
         if (ring && at->per_radius[p] > 0)
-            *four_at(&G[3][w]) = *four_from(&rule->at_nodes[p][3][w]) * at->per_radius[p];
+            *uz_four_at(&G[3][w]) = *uz_four_from(&rule->at_nodes[p][3][w]) * at->per_radius[p];
         else if (ring)
-            *four_at(&G[3][w]) = *four_from(&G[0][w]);
+            *uz_four_at(&G[3][w]) = *uz_four_from(&G[0][w]);
     }
 }
 
 /* force[axis][node]: what the stress does, P = F S: of each point Q = P by local coordinates, times the slopes by
  * these. */
 UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_points *laws, const uz_finite_rule *rule,
-                           gradients H, const shape *at, double across, int dim, int wide, bool ring)
+                           uz_gradients H, const uz_rest *at, double across, int dim, int wide, bool ring)
 {
     for (int i = 0; i < dim; i++)
         for (int w = 0; w < wide; w++)
             force[i][w] = (four){0};
     for (int p = 0; p < rule->gauss; p += LANES) {
         four F[3][3], Q[3][3], around = {0};
-        const four volume = *four_from(&at->volume[p]);
+        const four volume = *uz_four_from(&at->volume[p]);
         deformations(F, H, p, across, dim, ring);
         for (int i = 0; i < dim; i++) {
             four P[3] = {{0}};
             for (int J = 0; J < dim; J++) {
-                P[J] = F[i][0] * *four_from(&laws->S[COMPONENT[J][0]][p]);
+                P[J] = F[i][0] * *uz_four_from(&laws->S[COMPONENT[J][0]][p]);
                 for (int M = 1; M < dim; M++)
-                    P[J] += F[i][M] * *four_from(&laws->S[COMPONENT[J][M]][p]);
+                    P[J] += F[i][M] * *uz_four_from(&laws->S[COMPONENT[J][M]][p]);
             }
             if (ring && i == 0) { /* on the axis u_r / r is the derivative along r */
-                const four hoop = F[2][2] * *four_from(&laws->S[2][p]), per_radius = *four_from(&at->per_radius[p]);
+                const four hoop = F[2][2] * *uz_four_from(&laws->S[2][p]),
+                           per_radius = *uz_four_from(&at->per_radius[p]);
                 around = volume * hoop * per_radius;
                 four along = hoop;
                 for (int l = 0; l < LANES; l++)
@@ -342,9 +252,9 @@ UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_po
                 P[0] += along;
             }
             for (int l = 0; l < dim; l++) {
-                Q[i][l] = P[0] * *four_from(&at->inverse[l][0][p]);
+                Q[i][l] = P[0] * *uz_four_from(&at->inverse[l][0][p]);
                 for (int J = 1; J < dim; J++)
-                    Q[i][l] += P[J] * *four_from(&at->inverse[l][J][p]);
+                    Q[i][l] += P[J] * *uz_four_from(&at->inverse[l][J][p]);
                 Q[i][l] *= volume;
             }
         }
@@ -352,9 +262,9 @@ UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_po
             for (int w = 0; w < wide; w++) {
                 for (int i = 0; i < dim; i++)
                     for (int l = 0; l < dim; l++)
-                        force[i][w] += Q[i][l][g - p] * *four_from(&rule->at_nodes[g][l][LANES * w]);
+                        force[i][w] += Q[i][l][g - p] * *uz_four_from(&rule->at_nodes[g][l][LANES * w]);
                 if (ring)
-                    force[0][w] += around[g - p] * *four_from(&rule->at_nodes[g][3][LANES * w]);
+                    force[0][w] += around[g - p] * *uz_four_from(&rule->at_nodes[g][3][LANES * w]);
             }
     }
 }
@@ -380,8 +290,8 @@ UZ_INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_S
             for (int v = 0; v < used; v += LANES) {
                 four sum = {0};
                 for (int M = 0; M < dim; M++)
-                    sum += F[i][M] * *four_from(&DF[COMPONENT[J][M]][v]);
-                *four_at(&row[v]) = sum;
+                    sum += F[i][M] * *uz_four_from(&DF[COMPONENT[J][M]][v]);
+                *uz_four_at(&row[v]) = sum;
             }
             for (int L = 0; L < dim; L++)
                 row[i * dim + L] += volume * T[COMPONENT[J][L]];
@@ -391,7 +301,7 @@ UZ_INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_S
 }
 
 /* S of the strain without h'h / 2. */
-UZ_INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], gradients of_step,
+UZ_INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], uz_gradients of_step,
                              int p, int dim, bool ring)
 {
     double h[3][3], q[N_STRAINS];
@@ -423,20 +333,20 @@ UZ_INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule
         double t[2][PADDED];
         for (int r = 0; r < rows; r++)
             for (int v = 0; v < used; v += LANES) {
-                four by = at->G[g][0][a] * *four_from(&at->A[g][(i + r) * dim][v]);
+                four by = at->G[g][0][a] * *uz_four_from(&at->A[g][(i + r) * dim][v]);
                 for (int J = 1; J < dim; J++)
-                    by += at->G[g][J][a] * *four_from(&at->A[g][(i + r) * dim + J][v]);
+                    by += at->G[g][J][a] * *uz_four_from(&at->A[g][(i + r) * dim + J][v]);
                 if (ring && i + r == 0)
-                    by += at->G[g][3][a] * *four_from(&at->A[g][AROUND][v]);
-                *four_at(&t[r][v]) = by;
+                    by += at->G[g][3][a] * *uz_four_from(&at->A[g][AROUND][v]);
+                *uz_four_at(&t[r][v]) = by;
             }
         for (int w = first; w < wide; w++)
             for (int r = 0; r < rows; r++)
                 for (int k = 0; k < dim; k++) {
                     for (int L = 0; L < dim; L++)
-                        sum[r][k][w] += t[r][k * dim + L] * *four_from(&at->G[g][L][LANES * w]);
+                        sum[r][k][w] += t[r][k * dim + L] * *uz_four_from(&at->G[g][L][LANES * w]);
                     if (ring && k == 0)
-                        sum[r][k][w] += t[r][AROUND] * *four_from(&at->G[g][3][LANES * w]);
+                        sum[r][k][w] += t[r][AROUND] * *uz_four_from(&at->G[g][3][LANES * w]);
                 }
     }
     for (int r = 0; r < rows; r++)
@@ -473,17 +383,17 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
 {
     const uz_finite_rule *rule = x->rule;
     uz_finite_forces *out = x->out;
-    shape rest;
-    gradients H, of_step;
+    uz_rest rest;
+    uz_gradients H, of_step;
     law_points laws;
     points at;
     four force[3][UZ_ELEMENT_NODES / LANES];
     const uz_model model = x->element->model;
     const uz_lame lame = uz_lame_in_space(model, x->element->lame);
-    shape_of(&rest, rule, x->element, dim, ring);
-    find_gradients(H, rule, &rest, x->u, dim, ring);
+    uz_rest_of(&rest, rule, x->element, dim, ring);
+    uz_find_gradients(H, rule, &rest, x->u, dim, ring);
     if (x->ke && x->step)
-        find_gradients(of_step, rule, &rest, x->step, dim, ring);
+        uz_find_gradients(of_step, rule, &rest, x->step, dim, ring);
     const double across = dim == 2 && !ring ? x->element->across : 0;
     look_at_orientation(&out->least_det, rule, H, across, dim, ring);
     if (!(out->least_det > 0) ||
@@ -615,11 +525,11 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
     double F[3][3], C[N_STRAINS], W, S[N_STRAINS] = {0}, D[N_STRAINS][N_STRAINS];
     const bool ring = element->model == UZ_AXISYMMETRIC;
     uz_finite_rule rule;
-    shape rest;
-    gradients H;
+    uz_rest rest;
+    uz_gradients H;
     uz_finite_rule_at(&rule, element->kind, element->model, point);
-    shape_of(&rest, &rule, element, rule.dim, ring);
-    find_gradients(H, &rule, &rest, u, rule.dim, ring);
+    uz_rest_of(&rest, &rule, element, rule.dim, ring);
+    uz_find_gradients(H, &rule, &rest, u, rule.dim, ring);
     deformation(F, H, 0, rule.dim, ring);
     F[2][2] += element->across;
     out->det = orientation(F, rule.dim);
