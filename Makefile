@@ -194,7 +194,7 @@ $(BUILD)/obj/%.o: %.c
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) $(if $(filter tests/unit/%,$<),-O0,$(if $(SAN),-Wno-error)) -c -o $@ $<
 
 # Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
-CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c solver/finite/finite_element.c $(wildcard solver/brick/*.c)
+CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c solver/finite/finite_element.c solver/finite/turning.c $(wildcard solver/brick/*.c)
 $(call obj,$(CONTRACTED)): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
 UNROLLED := solver/amg/blocks.c solver/amg/cg.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/amg/multigrid.c solver/amg/prolong.c solver/amg/rough.c solver/certificate/finite.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/finite/*.c solver/post/*.c) solver/io/vtu.c

@@ -1,67 +1,66 @@
+/* turning.c: what concerns Gauss points stands in lanes by four of them, what concerns pairs of nodes by four nodes. */
 #include "finite/turning.h"
 
 #include "assembly/parts.h"
 #include "core/cpu.h"
 #include "element/element.h"
+#include "finite/point_lanes.h"
 
 #include <math.h>
 #include <string.h>
 
-/* H[c][i] (dim x dim): the derivative of u_c by x_i. */
-UZ_INLINE void gradient(double H[3][3], const uz_gauss_state *at, const double *u, int nodes, int dim)
-{
-    for (int c = 0; c < dim; c++)
-        for (int i = 0; i < dim; i++) {
-            H[c][i] = 0;
-            for (int a = 1; a < nodes; a++)
-                H[c][i] += (u[dim * a + c] - u[c]) * at->grad[a][i];
-        }
-}
+enum { LANES = UZ_FINITE_LANES, GROUPS = UZ_ELEMENT_NODES / UZ_FINITE_LANES };
+typedef uz_four four;
 
-UZ_INLINE void multiply(double out[3][3], double A[3][3], double B[3][3], int dim)
+UZ_INLINE void multiply(four out[3][3], four A[3][3], four B[3][3], int dim)
 {
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++) {
-            out[i][j] = 0;
-            for (int k = 0; k < dim; k++)
+            out[i][j] = A[i][0] * B[0][j];
+            for (int k = 1; k < dim; k++)
                 out[i][j] += A[i][k] * B[k][j];
         }
 }
 
-/* R of a skew w (both dim x dim): (I + w) V^-1 with V^2 = I - w^2. Returns |w|^2. */
-UZ_INLINE double rotation(double R[3][3], double w[3][3], int dim)
+/* R of a skew w (both dim x dim): (I + w) V^-1 with V^2 = I - w^2. square: |w|^2. */
+UZ_INLINE void rotation(four *square, four R[3][3], four w[3][3], int dim)
 {
-    double square = 0, ww[3][3];
+    four root = {0}, ww[3][3];
+    *square = (four){0};
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < i; j++)
-            square += w[i][j] * w[i][j];
-    const double root = sqrt(1 + square);
+            *square += w[i][j] * w[i][j];
+    for (int l = 0; l < LANES; l++)
+        root[l] = sqrt(1 + (*square)[l]);
     multiply(ww, w, w, dim);
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++)
             R[i][j] = (i == j) + w[i][j] / root + ww[i][j] / (root * (root + 1));
-    return square;
 }
 
-/* H, of where a step begins, becomes what a turned step changes it by; h is the step's. out: the integrands. */
-UZ_INLINE void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
+/* H, of where a step begins, becomes what a turned step changes it by; h is the step's. turning, strain: the
+ * integrands. */
+UZ_INLINE void turn(four *turning, four *strain, four H[3][3], four h[3][3], int dim)
 {
-    double F[3][3], inverse[3][3], g[3][3], w[3][3], stretch[3][3], R[3][3], to[3][3];
+    four F[3][3], transposed[3][3], inverse[3][3], det, g[3][3], w[3][3], stretch[3][3], R[3][3], to[3][3], square;
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++)
-            F[i][j] = (i == j) + H[i][j];
-    uz_invert_small(inverse, F, dim);
+            F[i][j] = H[i][j] + (i == j);
+    uz_lane_invert(transposed, &det, F, dim);
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            inverse[i][j] = transposed[j][i];
     multiply(g, h, inverse, dim);
-    out->strain = 0;
+    *strain = (four){0};
     for (int i = 0; i < dim; i++)
         for (int j = 0; j < dim; j++) {
-            const double strain = 0.5 * (g[i][j] + g[j][i]);
-            out->strain += strain * strain;
-            stretch[i][j] = (i == j) + strain;
+            const four own = 0.5 * (g[i][j] + g[j][i]);
+            *strain += own * own;
+            stretch[i][j] = own + (i == j);
             w[i][j] = 0.5 * (g[i][j] - g[j][i]);
         }
-    const double square = rotation(R, w, dim);
-    out->turning = 0.5 * square * square; /* w'w is |w|^2 along both directions that turn */
+    rotation(&square, R, w, dim);
+    *turning = 0.5 * square * square; /* w'w is |w|^2 along both directions that turn */
     multiply(to, stretch, F, dim);
     multiply(H, R, to, dim);
     for (int i = 0; i < dim; i++)
@@ -69,85 +68,164 @@ UZ_INLINE void turn(uz_turning *out, double H[3][3], double h[3][3], int dim)
             H[i][j] -= F[i][j];
 }
 
-UZ_INLINE void add_turning(uz_turning *out, double *force, const uz_element *element, const int64_t *node,
-                           const double *u, const double *step, int dim)
+/* An element that a step is taken from u by, or whose metric is made. */
+typedef struct {
+    const uz_finite_rule *rule;
+    const uz_element *element;
+    const double *u, *step;
+} task;
+
+/* force: nodes x dim. */
+UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int dim)
 {
-    const int count = uz_element_node_count(element->kind);
-    for (int g = 0; g < uz_element_rule(element->kind, element->model)->count; g++) {
-        uz_gauss_state at;
-        uz_turning own;
-        double H[3][3], h[3][3], around = 0;
-        uz_gauss_state_at(&at, element, g);
-        const bool ring = element->model == UZ_AXISYMMETRIC;
-        const double weight = element->lame.mu * at.volume;
-        gradient(H, &at, u, count, dim);
-        gradient(h, &at, step, count, dim);
-        turn(&own, H, h, dim);
-        out->turning += weight * own.turning;
-        out->strain += weight * own.strain;
-        for (int a = 0; a < count && ring; a++)
-            around += at.N[a] / at.radius * step[dim * a];
-        for (int a = 0; a < count; a++) {
-            double *to = force + dim * node[a];
-            for (int c = 0; c < dim; c++)
-                for (int i = 0; i < dim; i++)
-                    to[c] += weight * H[c][i] * at.grad[a][i];
-            to[0] += ring ? weight * around * at.N[a] / at.radius : 0;
+    const uz_finite_rule *rule = x->rule;
+    const bool ring = dim == 2 && rule->model == UZ_AXISYMMETRIC;
+    const int wide = (rule->nodes + LANES - 1) / LANES;
+    uz_rest rest;
+    uz_gradients from, by;
+    four sum[3][GROUPS] = {{{0}}};
+    uz_rest_of(&rest, rule, x->element, dim, ring);
+    uz_find_gradients(from, rule, &rest, x->u, dim, ring);
+    uz_find_gradients(by, rule, &rest, x->step, dim, ring);
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        four H[3][3], h[3][3], Q[3][3], turning, strain, around = {0};
+        const four weight = x->element->lame.mu * *uz_four_from(&rest.volume[p]);
+        for (int c = 0; c < dim; c++)
+            for (int i = 0; i < dim; i++) {
+                H[c][i] = *uz_four_from(&from[c][i][p]);
+                h[c][i] = *uz_four_from(&by[c][i][p]);
+            }
+        turn(&turning, &strain, H, h, dim);
+        for (int c = 0; c < dim; c++)
+            for (int l = 0; l < dim; l++) {
+                Q[c][l] = H[c][0] * *uz_four_from(&rest.inverse[l][0][p]);
+                for (int i = 1; i < dim; i++)
+                    Q[c][l] += H[c][i] * *uz_four_from(&rest.inverse[l][i][p]);
+                Q[c][l] *= weight;
+            }
+        if (ring)
+            around = weight * *uz_four_from(&by[2][2][p]) * *uz_four_from(&rest.per_radius[p]);
+        for (int g = p; g < p + LANES && g < rule->gauss; g++) {
+            out->turning += weight[g - p] * turning[g - p];
+            out->strain += weight[g - p] * strain[g - p];
+            for (int w = 0; w < wide; w++) {
+                for (int c = 0; c < dim; c++)
+                    for (int l = 0; l < dim; l++)
+                        sum[c][w] += Q[c][l][g - p] * *uz_four_from(&rule->at_nodes[g][l][LANES * w]);
+                if (ring)
+                    sum[0][w] += around[g - p] * *uz_four_from(&rule->at_nodes[g][3][LANES * w]);
+            }
         }
     }
+    for (int a = 0; a < rule->nodes; a++)
+        for (int c = 0; c < dim; c++)
+            force[dim * a + c] = sum[c][a / LANES][a % LANES];
+}
+
+/* ke: full, and zero at entry. */
+UZ_INLINE void find_metric(double *ke, const task *x, int dim)
+{
+    const uz_finite_rule *rule = x->rule;
+    const bool ring = dim == 2 && rule->model == UZ_AXISYMMETRIC;
+    const int n = dim * rule->nodes, wide = (rule->nodes + LANES - 1) / LANES;
+    uz_rest rest;
+    four sum[UZ_ELEMENT_NODES][GROUPS] = {{{0}}}, hoop[UZ_ELEMENT_NODES][GROUPS] = {{{0}}};
+    uz_rest_of(&rest, rule, x->element, dim, ring);
+    for (int g = 0; g < rule->gauss; g++) {
+        const double weight = x->element->lame.mu * rest.volume[g];
+        const double around = ring ? weight * rest.per_radius[g] * rest.per_radius[g] : 0;
+        four G[3][GROUPS];
+        for (int w = 0; w < wide; w++)
+            for (int j = 0; j < dim; j++) {
+                G[j][w] = *uz_four_from(&rule->at_nodes[g][0][LANES * w]) * rest.inverse[0][j][g];
+                for (int i = 1; i < dim; i++)
+                    G[j][w] += *uz_four_from(&rule->at_nodes[g][i][LANES * w]) * rest.inverse[i][j][g];
+            }
+        for (int a = 0; a < rule->nodes; a++)
+            for (int w = 0; w <= a / LANES; w++) {
+                for (int j = 0; j < dim; j++)
+                    sum[a][w] += weight * G[j][a / LANES][a % LANES] * G[j][w];
+                if (ring)
+                    hoop[a][w] += around * rule->at_nodes[g][3][a] * *uz_four_from(&rule->at_nodes[g][3][LANES * w]);
+            }
+    }
+    for (int a = 0; a < rule->nodes; a++)
+        for (int b = 0; b <= a; b++)
+            for (int c = 0; c < dim; c++) {
+                const double own = sum[a][b / LANES][b % LANES] + (c == 0 ? hoop[a][b / LANES][b % LANES] : 0);
+                ke[n * (dim * a + c) + dim * b + c] = ke[n * (dim * b + c) + dim * a + c] = own;
+            }
+}
+
+typedef struct {
+    void (*add_turning)(uz_turning *out, double *force, const task *x);
+    void (*find_metric)(double *ke, const task *x);
+} kernels;
+
+#define ADD_TURNING(NAME, DIM, VERSION)                                                                                \
+    VERSION static void NAME(uz_turning *out, double *force, const task *x)                                            \
+    {                                                                                                                  \
+        add_turning(out, force, x, DIM);                                                                               \
+    }
+#define FIND_METRIC(NAME, DIM, VERSION)                                                                                \
+    VERSION static void NAME(double *ke, const task *x)                                                                \
+    {                                                                                                                  \
+        find_metric(ke, x, DIM);                                                                                       \
+    }
+ADD_TURNING(plane_turning, 2, )
+ADD_TURNING(space_turning, 3, )
+ADD_TURNING(plane_fused_turning, 2, UZ_AVX2_FMA)
+ADD_TURNING(space_fused_turning, 3, UZ_AVX2_FMA)
+FIND_METRIC(plane_metric, 2, )
+FIND_METRIC(space_metric, 3, )
+FIND_METRIC(plane_fused_metric, 2, UZ_AVX2_FMA)
+FIND_METRIC(space_fused_metric, 3, UZ_AVX2_FMA)
+
+static kernels kernels_of(int dim)
+{
+    if (uz_cpu_has_avx2_fma())
+        return dim == 2 ? (kernels){plane_fused_turning, plane_fused_metric}
+                        : (kernels){space_fused_turning, space_fused_metric};
+    return dim == 2 ? (kernels){plane_turning, plane_metric} : (kernels){space_turning, space_metric};
+}
+
+/* The rule of an element's kind: *rule, made anew where it is another one's. */
+static void use_rule(uz_finite_rule *rule, const uz_element *element)
+{
+    if (rule->nodes == 0 || rule->kind != element->kind)
+        uz_finite_rule_of(rule, element->kind, element->model);
 }
 
 void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to)
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
+    const kernels by = kernels_of(dim);
+    uz_finite_rule rule = {.nodes = 0};
     *out = (uz_turning){.turning = 0};
     memset(force, 0, (size_t)(dim * mesh->n_nodes) * sizeof *force);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         uz_element element;
-        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], step[UZ_ELEMENT_DOFS];
+        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], step[UZ_ELEMENT_DOFS], own[UZ_ELEMENT_DOFS];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         uz_body_element(&element, xyz, model, e);
+        use_rule(&rule, &element);
         for (int i = 0; i < dim * count; i++) {
             u[i] = from[dim * node[i / dim] + i % dim];
             step[i] = to[dim * node[i / dim] + i % dim] - u[i];
         }
-        if (dim == 2)
-            add_turning(out, force, &element, node, u, step, 2);
-        else
-            add_turning(out, force, &element, node, u, step, 3);
+        by.add_turning(out, own, &(task){&rule, &element, u, step});
+        for (int i = 0; i < dim * count; i++)
+            force[dim * node[i / dim] + i % dim] += own[i];
     }
-}
-
-/* The lower triangle of blocks, and with it the upper one. */
-UZ_INLINE void add_metric(double *ke, const uz_element *element, int dim)
-{
-    const int count = uz_element_node_count(element->kind), n = dim * count;
-    for (int g = 0; g < uz_element_rule(element->kind, element->model)->count; g++) {
-        uz_gauss_state at;
-        uz_gauss_state_at(&at, element, g);
-        const double weight = element->lame.mu * at.volume;
-        const double around = element->model == UZ_AXISYMMETRIC ? 1 / at.radius : 0;
-        for (int a = 0; a < count; a++)
-            for (int b = 0; b <= a; b++) {
-                double *of = ke + dim * (n * a + b);
-                double sum = 0;
-                for (int i = 0; i < dim; i++)
-                    sum += at.grad[a][i] * at.grad[b][i];
-                for (int c = 0; c < dim; c++)
-                    of[(n + 1) * c] += weight * sum;
-                of[0] += around > 0 ? weight * around * around * at.N[a] * at.N[b] : 0;
-            }
-    }
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < i; k++)
-            ke[n * k + i] = ke[n * i + k];
 }
 
 void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
 {
     const uz_mesh *mesh = &model->mesh;
+    const kernels by = kernels_of(mesh->dim);
+    uz_finite_rule rule = {.nodes = 0};
     memset(metric->K.val, 0, (size_t)metric->K.ptr[metric->K.cols] * sizeof *metric->K.val);
     memset(metric->K_fixed.val, 0, (size_t)metric->K_fixed.ptr[metric->K_fixed.cols] * sizeof *metric->K_fixed.val);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
@@ -158,10 +236,8 @@ void uz_turning_metric(uz_body_model *metric, const uz_body_model *model)
         const size_t n = (size_t)(mesh->dim * count);
         memset(ke, 0, n * n * sizeof *ke);
         uz_body_element(&element, xyz, model, e);
-        if (mesh->dim == 2)
-            add_metric(ke, &element, 2);
-        else
-            add_metric(ke, &element, 3);
+        use_rule(&rule, &element);
+        by.find_metric(ke, &(task){.rule = &rule, .element = &element});
         uz_add_stiffness(metric, ke, node, count);
     }
 }
