@@ -80,6 +80,7 @@ void uz_analysis_free(uz_analysis *analysis)
         cholmod_l_free_factor(&analysis->L, &common);
         cholmod_l_finish(&common);
     }
+    uz_refill_free(atomic_load(&analysis->spare));
     free(analysis->last);
     free(analysis->position);
     free(analysis->share);

@@ -119,6 +119,10 @@ uz_status uz_factor_new(uz_factor **out, const uz_analysis *analysis, uz_error *
     return UZ_OK;
 }
 
+/* Entries of K up to which what is found of its pattern is kept beside an analysis: some 10 MB. Of larger bodies it
+ * takes next to nothing of a factorization. */
+enum { SPARED = 1 << 18 };
+
 static uz_status create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                         bool briefly, const uz_hooks *hooks, uz_error *err)
 {
@@ -142,14 +146,18 @@ static uz_status create(uz_factor **out, const uz_csc *K, const uz_analysis *ana
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     if (status == UZ_OK && !is_for_many_threads(factor)) {
-        uz_refill *numbers;
+        const bool again = briefly && analysis->nnz <= SPARED; /* others of the pattern are likely to follow */
+        uz_refill *numbers = again ? atomic_exchange(&factor->analysis->spare, NULL) : NULL;
         int64_t refused;
-        status = uz_refill_new(&numbers, factor, K, true, err);
+        if (numbers)
+            uz_refill_renew(numbers, K);
+        else
+            status = uz_refill_new(&numbers, factor, K, !again, err);
         if (status == UZ_OK)
             status = uz_refill_run(&refused, numbers, factor, err);
         if (status == UZ_OK && refused < factor->n)
             status = refuse_pivot(factor, refused, err);
-        uz_refill_free(numbers);
+        uz_refill_free(again ? atomic_exchange(&factor->analysis->spare, numbers) : numbers);
     } else if (status == UZ_OK) {
         cholmod_sparse *S = uz_permute(K, factor->analysis->position, NULL, &common);
         status = factorize(factor, S, &common, err);

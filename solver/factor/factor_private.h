@@ -7,6 +7,8 @@
 #include <stdatomic.h>
 #include <suitesparse/cholmod.h>
 
+typedef struct uz_refill uz_refill;
+
 struct uz_analysis {
     atomic_int holders; /* creator and factors: the last one frees it */
     cholmod_factor *L;  /* symbolic, supernodal */
@@ -19,6 +21,7 @@ struct uz_analysis {
     uz_order_choice chosen, considered[UZ_CHOICES];
     int n_considered;
     double seconds;
+    _Atomic(uz_refill *) spare; /* what was found of the pattern for a factor that was made briefly; NULL: nothing */
 };
 
 /* Whose a supernode is: of two shares, none of which needs the other, or of the rest, which comes after both where L is
@@ -36,8 +39,9 @@ bool uz_is_large(int64_t columns, int64_t rows);
 uz_status uz_factor_solve_shares(const uz_factor *factor, double *X, double *Y, bool forward, uz_error *err);
 
 /* What making the numbers of a factor takes (refill.c). once: for these of K alone. UZ_ERR_MEMORY. */
-typedef struct uz_refill uz_refill;
 uz_status uz_refill_new(uz_refill **out, const uz_factor *factor, const uz_csc *K, bool once, uz_error *err);
+/* Other values of the same pattern: of one not made for once. */
+void uz_refill_renew(uz_refill *x, const uz_csc *K);
 void uz_refill_free(uz_refill *x);
 /* *refused: the first column, in the factor's order, whose pivot is not positive, with memory to be given back; n:
  * none. UZ_ERR_MEMORY. */

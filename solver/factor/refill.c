@@ -507,6 +507,13 @@ uz_status uz_refill_run(int64_t *refused, uz_refill *x, uz_factor *factor, uz_er
     return UZ_OK;
 }
 
+void uz_refill_renew(uz_refill *x, const uz_csc *K)
+{
+    double *value = x->K->x;
+    for (int64_t k = 0; k < K->ptr[K->cols]; k++)
+        value[x->place[k]] = K->val[k];
+}
+
 uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
     const int64_t count = K->ptr[K->cols];
@@ -517,9 +524,7 @@ uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
         if (status != UZ_OK)
             return status;
     } else {
-        double *value = factor->refill->K->x;
-        for (int64_t k = 0; k < count; k++)
-            value[factor->refill->place[k]] = K->val[k];
+        uz_refill_renew(factor->refill, K);
     }
     int64_t refused;
     uz_status status = uz_refill_run(&refused, factor->refill, factor, err);

@@ -475,6 +475,43 @@ TEST(another_held_dof_changes_little_of_a_factor)
 }
 
 /* e_j'K^-1 e_j <= bound / K_jj for all j, and for random vectors. */
+/* One after the other, of one pattern: each is the factor of its own numbers. Scaled by a power of four, these have the
+ * same digits. */
+TEST(factors_made_briefly_have_their_own_numbers)
+{
+    enum { WIDTH = 20, N = WIDTH * WIDTH, FACTORS = 3 };
+    uz_csc K = grid(WIDTH, WIDTH);
+    uz_factor *factor, *brief;
+    uz_error err;
+    uz_factor_workspace *ws = uz_factor_workspace_new();
+    double *b = vector(N), *x = vector(N), *want = vector(N), *room = vector(N);
+    qp_random rng = {1};
+    for (int64_t i = 0; i < N; i++)
+        b[i] = random_signed(&rng);
+    CHECK_INT(factor_of(&factor, &K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
+    CHECK(uz_factor_solve(factor, ws, want, b, room, &err) == UZ_OK);
+    uz_analysis *analysis = uz_factor_analysis(factor);
+    for (int k = 0; k < FACTORS; k++) {
+        CHECK_INT(uz_factor_create_briefly(&brief, &K, analysis, 0, NULL, &err), UZ_OK);
+        CHECK(uz_factor_solve(brief, ws, x, b, room, &err) == UZ_OK);
+        for (int64_t i = 0; i < N; i++)
+            CHECK(ldexp(x[i], 2 * k) == want[i]);
+        uz_factor_free(brief);
+        for (int64_t q = 0; q < K.ptr[N]; q++)
+            K.val[q] *= 4;
+    }
+    K.val[K.ptr[N / 2]] = -1;
+    CHECK_INT(uz_factor_create_briefly(&brief, &K, analysis, 0, NULL, &err), UZ_ERR_NOT_SPD);
+    uz_analysis_free(analysis);
+    uz_factor_free(factor);
+    uz_factor_workspace_free(ws);
+    uz_csc_clear(&K);
+    free(b);
+    free(x);
+    free(want);
+    free(room);
+}
+
 TEST(inverse_norm_is_an_upper_bound)
 {
     for (uint64_t seed = 0; seed < 40; seed++) {
