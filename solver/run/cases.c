@@ -78,12 +78,15 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);
         status = uz_solve_moving(&results[i], &one, settings, cache, hooks, started, err);
-        if (status == UZ_OK) {
-            uz_judge_whole_error(results[i], &one, settings, cache, hooks, started);
-            uz_judge_quantity(results[i]);
-        } else {
+        if (status != UZ_OK)
             name_case(err, problem, i);
-        }
+    }
+    if (status == UZ_OK)
+        status = uz_look_at_few_elements(results, problem, settings, cache, hooks, started, err);
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        const uz_problem one = uz_problem_of_case(problem, i);
+        uz_judge_whole_error(results[i], &one, settings, cache, hooks, started);
+        uz_judge_quantity(results[i]);
     }
     return status;
 }

@@ -4,6 +4,7 @@
  *     uz_solve_grid_sequence      grid_sequence.c  grid after grid, where the mesh is chosen
  *     uz_settle_cases             cases.c          what answers ask for: those that only the obstacle holds, or that
  * move uz_judge_whole_error        guarantee.c      a bound on one answer, by problems that the layers below solve
+ *     uz_look_at_few_elements     few_elements.c   what few elements hide of their error
  *     uz_solve_semicoercive       semicoercive.c   one of these, by problems that the next layer solves
  *     uz_solve_rounds             rounds.c         all load cases on one setup, in rounds of contact rows
  *     uz_block_solve              block.c          several loads at once
@@ -29,6 +30,12 @@ uz_status uz_solve_given(uz_result **results, const uz_problem *problem, const u
 uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, double started,
                           uz_error *err);
+
+/* Where a mesh that is not refined has few elements, of which estimates may be worth nothing: what answers are told to
+ * be off by, and intervals of their quantities, are no less than what the same mesh with all elements divided tells
+ * (few_elements.c). Wedges are not divided. UZ_ERR_MEMORY. */
+uz_status uz_look_at_few_elements(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                                  uz_cache *cache, const uz_hooks *hooks, double started, uz_error *err);
 
 /* Where settings ask for it, a guaranteed bound on the whole error of an answer, or why there is none (uz_guarantee);
  * and an answer that converged becomes UZ_MESH_LIMIT where the whole error is not settings->total_error. */

@@ -83,11 +83,7 @@ static double total_at(const uz_scene *scene, int64_t n, double requested)
     uz_scene s = *scene;
     s.box = grid_of(scene, n);
     uz_result *result = body_solve(&s, 0.1 * requested);
-    uz_body_model model = body_model(&s);
-    double share;
-    const double mesh = uz_estimate_mesh_error(NULL, &share, &model, &s, result->u);
-    const double total = hypot(mesh, result->summary.certificate.relative_error);
-    uz_body_model_clear(&model);
+    const double total = uz_total_error(NULL, &result->summary);
     uz_result_free(result);
     return total;
 }

@@ -135,7 +135,7 @@ TEST(tilted_body_is_that_of_the_exhaustive_search)
 
 TEST(balanced_accuracy_is_a_share_of_the_mesh_error)
 {
-    uz_scene scene = rolled_block(12, 4, 0, -0.05);
+    uz_scene scene = rolled_block(18, 6, 0, -0.05);
     add_load(&scene, "right", 0.5, 0.1);
     uz_problem problem = problem_in(scene);
     uz_settings settings = uz_settings_default();
