@@ -7,6 +7,7 @@
  * orthogonality). */
 #include "assembly/parts.h"
 
+#include "assembly/body_parts.h"
 #include "assembly/nodal_strains.h"
 #include "assembly/stress_lanes.h"
 #include "assembly/thin_elements.h"
@@ -129,6 +130,8 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 
 /* What solves leave of the way of a body that is only carried along, in parts of it. */
 #define CARRIED 1e-12
+/* What is a translation to that may be strained by a few times as much. */
+#define STRAINED_BY 10
 
 /* What supports hold apart by more than this part of their way is no rounding of what they were given. */
 #define APART (4 * DBL_EPSILON)
@@ -160,12 +163,12 @@ static double energy_of_way(double *own, const uz_body_model *model, const doubl
 }
 
 /* Has each element no more than that? So it is of a body that is only rotated. */
-static bool is_carried(const uz_body_model *model, const double *nodal)
+static bool is_carried(const uz_body_model *model, const double *nodal, double part)
 {
     bool carried = true;
     for (int64_t e = 0; e < model->mesh.n_elements && carried; e++) {
         double own;
-        const double most = energy_of_way(&own, model, nodal, e, CARRIED);
+        const double most = energy_of_way(&own, model, nodal, e, part);
         carried = own <= most;
     }
     return carried;
@@ -205,51 +208,96 @@ static bool goes_along(const uz_body_model *model, int64_t a)
     return so;
 }
 
-bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large)
+/* A part of the body: is it only translated, and what the first node that is held has, by axis or in all. */
+typedef struct {
+    const double *any, *first[3], *whole, *from;
+    bool shifted;
+} held_part;
+
+/* list (parts->count, zeroed): which are translations; returns whether all are. */
+static bool find_shifted(held_part *list, const uz_parts *parts, const uz_body_model *model, const double *nodal)
 {
     const int dim = model->mesh.dim;
-    const bool shifted = is_translation(model, nodal, CARRIED);
-    const double *first[3] = {NULL}, *whole = NULL, *from = NULL; /* what the first held node has, by axis or in all */
+    bool all = true;
     for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        const double *u = nodal + a * dim, *x = model->mesh.xyz + a * dim;
-        double way = 0, along = 0, length2 = 0, motion2 = 0;
-        bool all = true;
-        if ((uz_is_rigid(model, a) && !shifted) || goes_along(model, a) || uz_node_frame(model, a))
-            continue;
-        for (int c = 0; c < dim; c++) {
-            const int64_t j = model->dof[a * dim + c];
-            const bool held = j < 0 && j != UZ_NO_DOF;
-            all = all && held;
-            if (held && !first[c])
-                first[c] = u;
-            if (held && shifted && fabs(u[c] - first[c][c]) > APART * fabs(u[c]))
-                return true;
-        }
-        if (!all || shifted)
-            continue;
-        whole = whole ? whole : u;
-        from = from ? from : x;
-        for (int c = 0; c < dim; c++) { /* what the square of the distance to the first one grows by */
-            const double d = x[c] - from[c], e = u[c] - whole[c];
-            way = fmax(way, fmax(fabs(u[c]), fabs(whole[c])));
-            along += e * (2 * d + (large ? e : 0));
-            length2 += d * d;
-            motion2 += e * e;
-        }
-        const double length = sqrt(length2);
-        way += large ? length : 0; /* which is what a turn takes nodes to, less where they were */
-        if (fabs(along) > 2 * APART * way * (length + sqrt(motion2)))
+        held_part *p = &list[parts->of[a]];
+        const double *u = nodal + a * dim;
+        double way = 0;
+        p->shifted = p->any ? p->shifted : true;
+        p->any = p->any ? p->any : u;
+        for (int c = 0; c < dim; c++)
+            way = fmax(way, fabs(p->any[c]));
+        for (int c = 0; c < dim; c++)
+            p->shifted = p->shifted && fabs(u[c] - p->any[c]) <= CARRIED * way;
+        p->shifted = p->shifted && (model->kind != UZ_AXISYMMETRIC || fabs(u[0]) <= CARRIED * way);
+        all = all && p->shifted;
+    }
+    return all;
+}
+
+/* Is a node held farther from the first one of its part than rounding may? */
+static bool is_held_apart(held_part *p, const uz_body_model *model, const double *nodal, int64_t a, bool large)
+{
+    const int dim = model->mesh.dim;
+    const double *u = nodal + a * dim, *x = model->mesh.xyz + a * dim;
+    double way = 0, along = 0, length2 = 0, motion2 = 0;
+    bool all = true;
+    if ((uz_is_rigid(model, a) && !p->shifted) || goes_along(model, a) || uz_node_frame(model, a))
+        return false;
+    for (int c = 0; c < dim; c++) {
+        const int64_t j = model->dof[a * dim + c];
+        const bool held = j < 0 && j != UZ_NO_DOF;
+        all = all && held;
+        if (held && !p->first[c])
+            p->first[c] = u;
+        if (held && p->shifted && fabs(u[c] - p->first[c][c]) > APART * fabs(u[c]))
             return true;
     }
-    return false;
+    if (!all || p->shifted)
+        return false;
+    p->whole = p->whole ? p->whole : u;
+    p->from = p->from ? p->from : x;
+    for (int c = 0; c < dim; c++) { /* what the square of the distance to the first one grows by */
+        const double d = x[c] - p->from[c], e = u[c] - p->whole[c];
+        way = fmax(way, fmax(fabs(u[c]), fabs(p->whole[c])));
+        along += e * (2 * d + (large ? e : 0));
+        length2 += d * d;
+        motion2 += e * e;
+    }
+    const double length = sqrt(length2);
+    way += large ? length : 0; /* which is what a turn takes nodes to, less where they were */
+    return fabs(along) > 2 * APART * way * (length + sqrt(motion2));
+}
+
+/* *translated (may be NULL): is each part of the body carried along without a turn? Without memory it is stretched. */
+static bool is_stretched(bool *translated, const uz_body_model *model, const double *nodal, bool large)
+{
+    uz_parts parts = {.list = NULL};
+    held_part *list = uz_find_parts(&parts, model, NULL) == UZ_OK ? uz_alloc_zero(parts.count, sizeof *list) : NULL;
+    const bool all = list && find_shifted(list, &parts, model, nodal);
+    bool stretched = !list;
+    for (int64_t a = 0; a < model->mesh.n_nodes && !stretched; a++)
+        stretched = is_held_apart(&list[parts.of[a]], model, nodal, a, large);
+    if (translated)
+        *translated = all;
+    uz_parts_clear(&parts);
+    free(list);
+    return stretched;
+}
+
+bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large)
+{
+    return is_stretched(NULL, model, nodal, large);
 }
 
 /* Does nothing strain the body, but rounding? */
 static bool nothing_strains(const uz_body_model *model, const uz_scene *scene, const double *nodal)
 {
     const bool alone = model->m == 0; /* what presses on a body may be less than solves leave, as loads may */
-    return (is_translation(model, nodal, CARRIED) || (alone && is_carried(model, nodal))) &&
-           !uz_is_loaded(model, scene) && !uz_is_stretched(model, nodal, false);
+    bool translated = false;
+    return is_carried(model, nodal, STRAINED_BY * CARRIED) && !uz_is_loaded(model, scene) &&
+           !is_stretched(&translated, model, nodal, false) &&
+           (translated || (alone && is_carried(model, nodal, CARRIED)));
 }
 
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
