@@ -81,7 +81,7 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
         if (status != UZ_OK)
             name_case(err, problem, i);
     }
-    if (status == UZ_OK)
+    if (status == UZ_OK && !problem->scene.refine)
         status = uz_look_at_few_elements(results, problem, settings, cache, hooks, started, err);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);

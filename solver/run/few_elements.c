@@ -314,7 +314,7 @@ uz_status uz_look_at_few_elements(uz_result **results, const uz_problem *problem
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const uz_scene *scene = &problem->scene;
     bool any = false;
-    if (problem->kind != UZ_PROBLEM_SCENE || (scene->refine && scene->n_bisected > 0))
+    if (problem->kind != UZ_PROBLEM_SCENE)
         return UZ_OK;
     for (int64_t i = 0; i < n; i++)
         any = any || (results[i]->n_nodes <= MOST_PLANE && is_estimated(results[i]));

@@ -483,6 +483,15 @@ static bool is_doubted(const search *g, const answers *x, int64_t n_elements, in
 
 /* ---- one grid */
 
+/* Do all cases have the error that is asked for, as far as they are answered? */
+static bool meets(const search *g, uz_result *const *results)
+{
+    bool met = true;
+    for (int64_t i = 0; i < g->n_cases; i++)
+        met = met && (!is_answered(&results[i]->summary) || error_of(g, &results[i]->summary) <= g->requested);
+    return met;
+}
+
 /* Of small deformation, from the pressure of the best answers so far. started: uz_seconds(). */
 static uz_status solve_small(uz_result **results, const search *g, const uz_problem *problem,
                              const uz_settings *settings, const uz_body_model *outline, double started, uz_error *err)
@@ -496,6 +505,8 @@ static uz_status solve_small(uz_result **results, const search *g, const uz_prob
         status = uz_solve_rounds(results, problem, settings, from, NULL, g->cache, g->hooks, err);
         status = uz_settle_cases(results, status, problem, settings, from, g->cache, g->hooks, started, err);
     }
+    if (status == UZ_OK && g->refines && !settings->guaranteed && meets(g, results))
+        status = uz_look_at_few_elements(results, problem, settings, g->cache, g->hooks, started, err);
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
