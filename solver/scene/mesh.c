@@ -102,17 +102,21 @@ const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
 
 void uz_mesh_middle(double middle[3], const uz_mesh *mesh)
 {
+    const double share = 1 / (double)mesh->n_nodes;
     memset(middle, 0, 3 * sizeof *middle);
-    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
-        middle[i % mesh->dim] += mesh->xyz[i] / (double)mesh->n_nodes;
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        for (int c = 0; c < mesh->dim; c++)
+            middle[c] += share * mesh->xyz[i * mesh->dim + c];
 }
 
 double uz_mesh_size(const uz_mesh *mesh)
 {
     double middle[3], most = 0;
     uz_mesh_middle(middle, mesh);
-    for (int64_t i = 0; i < mesh->n_nodes; i++)
-        most = fmax(most, uz_distance2(mesh->xyz + i * mesh->dim, middle, mesh->dim));
+    for (int64_t i = 0; i < mesh->n_nodes; i++) {
+        const double square = uz_distance2(mesh->xyz + i * mesh->dim, middle, mesh->dim);
+        most = square > most ? square : most;
+    }
     return 2 * sqrt(most);
 }
 
