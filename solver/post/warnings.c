@@ -664,7 +664,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         look_at_elements(&d, slope);
     uz_status status = UZ_OK;
     d.out->nonlinear = NAN;
-    if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene) &&
+    if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene, &model->mesh) &&
         (uz_has_finite_law(scene) || model->d <= UZ_MOST_COMPARED)) {
         const double buckling = uz_least_buckling_strain(model);
         double leverage = 0;

@@ -44,8 +44,8 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
 uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const uz_settings *settings,
                                const uz_hooks *hooks, double started, uz_error *err);
 
-/* May an answer with d dofs be one of large deformation, or be compared with it? */
-bool uz_may_be_compared(const uz_scene *scene, int64_t d);
+/* May an answer be one of large deformation, or be compared with it? */
+bool uz_may_be_compared(const uz_scene *scene, const uz_body_model *model);
 
 /* ---- shared by the files above */
 

@@ -63,7 +63,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
  * certificate. */
 static void predict_finite(uz_prediction *out, const uz_body_model *model, const uz_scene *scene)
 {
-    if (model->brick || !uz_may_be_compared(scene, model->d))
+    if (model->brick || !uz_may_be_compared(scene, model))
         return;
     const double certificate = uz_envelope_predict(&model->K) + uz_finite_certificate_bytes(model, &model->K);
     const double bytes = uz_finite_bytes(model, NULL, uz_has_pairs(scene)) + fmax(out->bytes, certificate);

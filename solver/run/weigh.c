@@ -40,10 +40,10 @@ static bool has_orthotropic(const uz_scene *scene)
     return has;
 }
 
-bool uz_may_be_compared(const uz_scene *scene, int64_t d)
+bool uz_may_be_compared(const uz_scene *scene, const uz_body_model *model)
 {
-    const bool small = scene->model != UZ_SOLID || d <= UZ_MOST_FINITE_DOFS;
-    return small && uz_has_finite_model(scene) && !has_orthotropic(scene) &&
+    const bool small = scene->model != UZ_SOLID || model->d <= UZ_MOST_FINITE_DOFS;
+    return small && uz_has_finite_model(scene, &model->mesh) && !has_orthotropic(scene) &&
            (scene->kinematics == UZ_KINEMATICS_FINITE || scene->kinematics == UZ_KINEMATICS_AUTO);
 }
 

@@ -139,16 +139,15 @@ static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *m
     return UZ_OK;
 }
 
-/* mesh NULL: what does not depend on it. */
 static uz_status check_loads(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const double *moment = scene->loads[i].moment;
-        const uz_group *group = scene->loads[i].has_point && mesh ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL)
-                                                                  : NULL; /* is not there: that is told elsewhere */
+        const uz_group *group = scene->loads[i].has_point ? uz_mesh_group(mesh, scene->loads[i].on, "", NULL)
+                                                          : NULL; /* is not there: that is told elsewhere */
         const int64_t nodes = group ? uz_group_node_count(mesh, group) : 0;
         bool rigid = true;
-        const uz_status status = mesh && nodes > MOST_POINT_NODES ? find_rigid(&rigid, scene, mesh, group, err) : UZ_OK;
+        const uz_status status = nodes > MOST_POINT_NODES ? find_rigid(&rigid, scene, mesh, group, err) : UZ_OK;
         if (status != UZ_OK)
             return status;
         if (!rigid)
@@ -209,7 +208,7 @@ uz_status uz_check_finite_loads(const uz_scene *scene, const uz_mesh *mesh, uz_e
     return status == UZ_OK && uz_may_be_finite(scene) ? check_loads(scene, mesh, err) : status;
 }
 
-bool uz_has_finite_model(const uz_scene *scene)
+bool uz_has_finite_model(const uz_scene *scene, const uz_mesh *mesh)
 {
-    return check_body(scene, NULL) == UZ_OK && check_loads(scene, NULL, NULL) == UZ_OK;
+    return check_body(scene, NULL) == UZ_OK && check_loads(scene, mesh, NULL) == UZ_OK;
 }

@@ -18,7 +18,7 @@ bool uz_has_finite_law(const uz_scene *scene);
 /* Is an answer to it one of finite kinematics? Where auto chose them, that has a place. */
 bool uz_is_finite_answer(const uz_scene *scene);
 /* Is there a model of large deformation for it, with laws of finite strain? (check_finite.c) */
-bool uz_has_finite_model(const uz_scene *scene);
+bool uz_has_finite_model(const uz_scene *scene, const uz_mesh *mesh);
 
 /* Of solids: the certificate's factor is one within an envelope. */
 #define UZ_MOST_FINITE_DOFS 20000

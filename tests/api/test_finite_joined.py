@@ -6,7 +6,7 @@ import math
 import numpy
 
 import service
-from service import check
+from service import check, expect
 from test_finite_supports import answer, refused, scene
 from test_tied import stacked
 from two_bodies import SOLID, body
@@ -472,6 +472,12 @@ def test_points_that_go_with_nothing(s):
                                      "supports": [held], "loads": [{"on": "tip", "force": [0, 1], "at": [2, 1]}]}, "on", "one point")):
         for kinematics in ("finite", "auto"):
             refused(s, scene(kinematics=kinematics, **request), f"/loads/0/{pointer}", word)
+    beside = {"loads": [{"on": "right", "force": [0, -0.1], "at": [2, 1]}], "supports": [held]}  # of the linear law: there is nothing to compare with
+    for cells, compared in (([2, 16], True), ([2, 1600], False)):
+        request = scene("linear", kinematics="auto", mesh={"box": {"size": [2, 1], "cells": cells}}, **beside)
+        predicted = expect(s.post(request, query="?validate=true"), 200).json["predicted"]
+        small = s.solved(request, "converged")["summary"].get("small_deformation")
+        check(("compared_bytes" in predicted) == bool(small) == compared, cells, predicted, small)
 
 
 if __name__ == "__main__":
