@@ -1,4 +1,5 @@
 /* predict.c: what a solve will take, from the pattern of its matrices: nothing is factored. */
+#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/aside.h"
 #include "core/error.h"
@@ -6,6 +7,7 @@
 #include "certificate/envelope.h"
 #include "run/cost.h"
 #include "run/finite.h"
+#include "run/problem.h"
 #include "factor/factor.h"
 #include "run/rows.h"
 #include "run/settings.h"
@@ -59,18 +61,63 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     return UZ_OK;
 }
 
-/* What large deformation takes: the largest of its contact problems, about as that of small deformation, and of its
- * certificate. */
-static void predict_finite(uz_prediction *out, const uz_body_model *model, const uz_scene *scene)
+/* *out: the case whose points couple most; its loads are none where no case has any. False: none may be compared. */
+static bool find_coupled(uz_scene *out, const uz_problem *problem, const uz_body_model *model)
 {
-    if (model->brick || !uz_may_be_compared(scene, model))
-        return;
-    const double certificate = uz_envelope_predict(&model->K) + uz_finite_certificate_bytes(model, &model->K);
-    const double bytes = uz_finite_bytes(model, NULL, uz_has_pairs(scene)) + fmax(out->bytes, certificate);
-    if (scene->kinematics == UZ_KINEMATICS_FINITE)
-        out->bytes = bytes;
-    else
-        out->compared_bytes = out->bytes + bytes;
+    bool found = false;
+    double most = 0;
+    for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1); i++) {
+        const uz_scene scene = problem->n_cases > 0 ? uz_scene_of_case(problem, i) : problem->scene;
+        double coupled = 0;
+        if (!uz_may_be_compared(&scene, model))
+            continue;
+        for (int64_t k = 0; k < scene.n_loads; k++) {
+            const uz_group *group =
+                scene.loads[k].has_point ? uz_mesh_group(&model->mesh, scene.loads[k].on, "", NULL) : NULL;
+            const double nodes = group ? (double)uz_group_node_count(&model->mesh, group) : 0;
+            coupled += nodes * nodes;
+        }
+        if (!found || coupled > most)
+            *out = scene;
+        most = fmax(most, coupled);
+        found = true;
+    }
+    out->n_loads = most > 0 ? out->n_loads : 0;
+    return found;
+}
+
+/* What large deformation takes: the largest of its contact problems, about as that of small deformation but for what
+ * forces at points couple, and of its certificate. */
+static uz_status predict_finite(uz_prediction *out, const uz_body_model *model, const uz_csc *N,
+                                const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                                uz_error *err)
+{
+    const bool finite = problem->scene.kinematics == UZ_KINEMATICS_FINITE;
+    uz_scene scene = problem->scene;
+    uz_body_model large = *model;
+    uz_prediction of_large = *out;
+    uz_status status = UZ_OK;
+    if (model->brick || !find_coupled(&scene, problem, model))
+        return UZ_OK;
+    const bool couples = scene.n_loads > 0 && (!finite || problem->n_cases > 0); /* and the model does not yet */
+    scene.kinematics = UZ_KINEMATICS_FINITE;
+    if (couples) {
+        large.K = large.K_fixed = (uz_csc){0};
+        status = uz_build_pattern(&large, &scene, err);
+        if (status == UZ_OK)
+            status = predict(&of_large, &large.K, N, &large, &scene, problem->n_cases, settings, hooks, err);
+    }
+    if (status == UZ_OK) {
+        const double certificate = uz_envelope_predict(&large.K) + uz_finite_certificate_bytes(&large, &large.K);
+        of_large.bytes = uz_finite_bytes(&large, NULL, uz_has_pairs(&scene)) + fmax(of_large.bytes, certificate);
+        out->compared_bytes = finite ? 0 : out->bytes + of_large.bytes;
+        *out = finite ? of_large : *out;
+    }
+    if (couples) {
+        uz_csc_clear(&large.K);
+        uz_csc_clear(&large.K_fixed);
+    }
+    return status;
 }
 
 /* N of a scene with the rows that its solve begins with; *all: how many there are. */
@@ -134,7 +181,7 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
             status = predict(out, &model.K, &N, &model, &problem->scene, problem->n_cases, settings, hooks, err);
         }
         if (status == UZ_OK)
-            predict_finite(out, &model, &problem->scene);
+            status = predict_finite(out, &model, &N, problem, settings, hooks, err);
         uz_csc_clear(&N);
         uz_body_model_clear(&model);
     } else if (status == UZ_OK) {
