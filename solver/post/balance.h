@@ -34,6 +34,8 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Those of them that are about the mesh alone, of an answer of large deformation. */
 void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene *scene);
+/* Of an answer whose mesh is told to be off by more than was known then: coarse_mesh tells as much. */
+void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error);
 /* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the
  * strains, by the energy norm; stress that turns with the body, along u; strains and rotations in the law itself,
  * weighted by the energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends,

@@ -593,14 +593,25 @@ static void look_at_stabilizer(const doubts *d)
          d->scene->stabilizer, part, part > MOST_STABILIZED ? "; hold what is pushed where nothing holds it" : "");
 }
 
+void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
+{
+    const int n = out->n_warnings;
+    int at = 0;
+    while (at < n && strcmp(out->warnings[at].code, "coarse_mesh") != 0)
+        at++;
+    if (!(mesh_error >= COARSE_MESH) || !isfinite(mesh_error))
+        return;
+    out->n_warnings = at; /* in place of the one that there is */
+    warn(out, "coarse_mesh", mesh_error,
+         "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and corners",
+         100 * mesh_error);
+    out->n_warnings = at < n ? n : out->n_warnings;
+}
+
 static void look_at_mesh(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
-    if (d->mesh_error >= COARSE_MESH && isfinite(d->mesh_error))
-        warn(d->out, "coarse_mesh", d->mesh_error,
-             "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and "
-             "corners",
-             100 * d->mesh_error);
+    uz_doubt_coarse_mesh(d->out, d->mesh_error);
     double poisson = 0;
     int64_t stiff = 0;
     for (int64_t e = 0; e < mesh->n_elements && d->model->kind != UZ_PLANE_STRESS; e++) {

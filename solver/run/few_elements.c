@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "element/element.h"
+#include "post/balance.h"
 #include "run/problem.h"
 #include "run/results.h"
 #include "run/settings.h"
@@ -203,36 +204,41 @@ static uz_status take_case(uz_result *result, const uz_result *on_finer, const f
     double square = 0;
     if (on_finer->summary.outcome != UZ_CONVERGED || !there || on_finer->n_nodes != f->fine.mesh.n_nodes)
         return UZ_OK;
+    if (s->discretization_error == 0 && on_finer->summary.discretization_error == 0) /* nothing strains that one */
+        return UZ_OK;
     const uz_status status = measure_distance(&square, f, result->u, on_finer->u, err);
+    if (status != UZ_OK || !isfinite(square))
+        return status;
     const double energy = 2 * e->strain_energy, told = fmin(1, on_finer->summary.discretization_error);
     const double left = 2 * there->strain_energy * told * told / (1 - told * told),
                  equations = s->certificate.absolute_error;
     square = fmax(0, square - equations * equations); /* which is told apart */
     square = fmax(square + left, f->linear ? OF_LINEAR * square : 0);
-    if (status != UZ_OK || !isfinite(square) || !(energy > 0))
-        return status;
+    if (!isfinite(square) || !(energy + square > 0))
+        return UZ_OK;
     s->discretization_error = fmax(s->discretization_error, sqrt(square / (energy + square)));
+    uz_doubt_coarse_mesh(result->evaluation, s->discretization_error);
     for (int64_t i = 0; i < e->n_quantities && i < there->n_quantities; i++)
         widen(&result->evaluation->quantities[i], &there->quantities[i], f->linear ? OF_LINEAR : 1);
     return UZ_OK;
 }
 
 /* Is it an answer with an error by estimate? What has none is carried along, or expands freely; of what is carried far,
- * and strained little, rounding is part of the distance. */
-static bool is_estimated(const uz_result *result)
+ * and strained little, rounding is part of the distance. A mesh that is given may only be carried, exactly, for want of
+ * nodes that a load could move; what is refined is divided before that is believed (grid_sequence.c). */
+static bool is_estimated(const uz_result *result, const uz_scene *scene)
 {
     const uz_summary *s = &result->summary;
     const int dim = result->mesh.dim;
     double way = 0, apart = 0;
-    if (!result->evaluation || !result->u || uz_has_no_answer(s) || !(s->discretization_error > 0) ||
-        !isfinite(s->discretization_error))
+    if (!result->evaluation || !result->u || uz_has_no_answer(s) || !isfinite(s->discretization_error))
         return false;
     for (int64_t i = 0; i < result->n_nodes * dim; i++) {
         const double own = fabs(result->u[i]), other = fabs(result->u[i] - result->u[i % dim]);
         way = own > way ? own : way;
         apart = other > apart ? other : apart;
     }
-    return apart > ALIKE * way;
+    return apart > ALIKE * way ? s->discretization_error > 0 : apart == 0 && !scene->refine;
 }
 
 static uz_status divide_all(finer *f, const uz_problem *problem, uz_error *err)
@@ -294,7 +300,7 @@ static uz_status look_closer(uz_result **results, finer *f, const uz_problem *pr
     }
     const double spent = (uz_seconds() - started) / (double)n;
     for (int64_t i = 0; there && i < n && status == UZ_OK; i++)
-        if (is_estimated(results[i])) {
+        if (is_estimated(results[i], &problem->scene)) {
             status = take_case(results[i], there[i], f, err);
             results[i]->summary.timings.total += spent;
             results[i]->summary.timings.certify += spent;
@@ -317,7 +323,7 @@ uz_status uz_look_at_few_elements(uz_result **results, const uz_problem *problem
     if (problem->kind != UZ_PROBLEM_SCENE)
         return UZ_OK;
     for (int64_t i = 0; i < n; i++)
-        any = any || (results[i]->n_nodes <= MOST_PLANE && is_estimated(results[i]));
+        any = any || (results[i]->n_nodes <= MOST_PLANE && is_estimated(results[i], &problem->scene));
     if (!any)
         return UZ_OK;
     finer f = {.settings = uz_settings_default()};

@@ -24,6 +24,7 @@
 #include "core/hooks.h"
 #include "finite/mesh_error.h"
 #include "methods/milestones.h"
+#include "post/balance.h"
 #include "post/trend.h"
 #include "run/finite.h"
 #include "run/marking.h"
@@ -428,11 +429,14 @@ static uz_status measure_move(double *moved, const uz_scene *scene, const uz_res
 }
 
 /* No less than what this is half the square of. */
-static void raise_error(uz_summary *s, double square)
+static void raise_error(uz_result *result, double square)
 {
+    uz_summary *s = &result->summary;
     const double least = sqrt(square / (s->evaluation->strain_energy + square));
-    if (!s->guarantee.proved)
-        s->discretization_error = fmax(s->discretization_error, least);
+    if (s->guarantee.proved || !(least > s->discretization_error))
+        return;
+    s->discretization_error = least;
+    uz_doubt_coarse_mesh(result->evaluation, least);
 }
 
 /* The estimate of a case becomes what the distances from coarser grids make of it, and that of the best of these is no
@@ -448,8 +452,8 @@ static uz_status take_hidden(uz_result *result, search *g, int64_t i, const uz_b
     if (status != UZ_OK)
         return status;
     now->from = g->best.number;
-    raise_error(&result->summary, hidden_by(all, now) * now->missed);
-    raise_error(&best->summary, now->moved);
+    raise_error(result, hidden_by(all, now) * now->missed);
+    raise_error(best, now->moved);
     g->best.error = fmax(g->best.error, error_of(g, &best->summary));
     return UZ_OK;
 }

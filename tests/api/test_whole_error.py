@@ -257,6 +257,27 @@ def test_a_solid_of_a_few_cells_hides_nothing(s):
         check_told(s, scene, {"box": {"size": [1.5, 1, 2], "cells": cells, "element": element}}, {"box": {"size": [1.5, 1, 2], "cells": fine, "element": "hex20"}})
 
 
+def test_nodes_that_no_load_moves_hide_nothing(s):
+    """All that a load acts on was held, on this mesh: it was told to lose nothing of an answer of 0, with an interval of 0 to 0."""
+    for element, cells in (("quad4", [1, 1]), ("tri3", [1, 1]), ("quad4", [1, 2])):
+        problem = {"kind": "scene", "model": "plane_strain", "kinematics": "fixed", "mesh": {"box": {"size": [1, 1], "cells": cells, "element": element}},
+                   "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "uy": 0}],
+                   "loads": [{"on": "all", "body_force": [0, -2]}]}
+        mine = solved(s, {"problem": problem, "quantities": [{"quantity": "strain_energy"}]})["summary"]
+        best = solved(s, {"problem": {**problem, "mesh": {"box": {"size": [1, 1], "cells": [32, 32], "element": "quad8"}}}})["summary"]
+        check(mine["error"]["mesh"] == 1 and mine["quantities"][0]["high"] > best["energy"]["strain"] > 5e-4, mine["error"], mine["quantities"])
+
+
+def test_a_coarse_mesh_is_warned_of_by_what_is_told(s):
+    """The warning was of the estimate before few elements were looked at: there was none, or another value."""
+    for element, force in (("hex8", [0, -2, 0]), ("hex8", [1, -2, 2])):
+        problem = {"kind": "scene", "model": "solid", "formulation": "standard", "kinematics": "fixed",
+                   "mesh": {"box": {"size": [1.5, 1, 2], "cells": [1, 1, 1], "element": element}}, "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                   "supports": [{"on": "bottom", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "all", "body_force": force}]}
+        summary = solved(s, {"problem": problem})["summary"]
+        check([one["value"] for one in summary["warnings"] if one["code"] == "coarse_mesh"] == [summary["error"]["mesh"]], summary["warnings"], summary["error"])
+
+
 def test_long_flat_elements_hide_nothing(s):
     """What goes on at the ends of a strip is no longer than it is thick: elements many times as long were told a twentieth to two thirds of
     their error, and on stiff springs 0.4."""
