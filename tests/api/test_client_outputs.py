@@ -124,6 +124,12 @@ def test_a_report_is_one_file_with_everything(server):
     said = " ".join(Page(run(server, "report", job, "--case", "b & c").stdout).words)
     check("b & c" in said and "Load cases" in said, said)
     check("no load case" in run(server, "report", job, "--case", "z", code=2).stderr)
+    of_box = {"kind": "scene", "model": "plane_strain", "mesh": {"box": {"size": [2, 1], "cells": [4, 2], "element": "quad4"}}, "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+              "supports": [{"on": "left", "ux": 0}], "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}
+    cases = [{"name": name, "loads": [{"on": "top", "traction": [0, by]}]} for name, by in (("on", -1), ("off", 1))]
+    job = run(server, "submit", "--wait", "-", stdin=json.dumps({"problem": of_box, "cases": cases}), code=7).stdout.split()[1]
+    said = " ".join(Page(run(server, "report", job, "--case", "off").stdout).words)  # it has no picture of the body
+    check("unheld" in said and "push the body away" in said, said)
     said = " ".join(Page(run(server, "report", solved(server, SPRINGS)).stdout).words)
     check("exact solution" in said and "Contacts" not in said, said)
     check("no job" in run(server, "report", ID, code=4).stderr)
