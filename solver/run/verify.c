@@ -8,6 +8,7 @@
 #include "run/problem.h"
 #include "run/run.h"
 #include "run/settings.h"
+#include "run/solve.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -161,6 +162,8 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
         status = uz_run_begin(&run, &asked, err);
     if (status == UZ_OK)
         status = verify(&run, u, r, err);
+    if (status == UZ_OK && !problem->scene.refine)
+        status = uz_look_at_few_elements(&run.result, problem, settings, cache, hooks, asked.started, err);
     if (status == UZ_OK) {
         *out = run.result;
         run.result = NULL;

@@ -44,6 +44,16 @@ def test_a_result_fed_back_is_verified(s):
         check(summary["contact"]["active"] == answer["summary"]["contact"]["active"], summary)
 
 
+def test_of_few_elements_as_much_is_told_as_where_they_are_solved(s):
+    """Of one hex8 half of the error was told."""
+    request = {"problem": {"kind": "scene", "kinematics": "fixed", "model": "solid", "mesh": {"box": {"size": [1.5, 1, 2], "cells": [1, 1, 1], "element": "hex8"}},
+                           "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "supports": [{"on": "bottom", "ux": 0, "uy": 0, "uz": 0}],
+                           "loads": [{"on": "all", "body_force": [0, -2, 0]}]}}
+    answer = solved(s, request)
+    told, again = answer["summary"]["error"]["mesh"], verify(s, request, answer).json["summary"]
+    check(told > 0.5 and abs(again["error"]["mesh"] / told - 1) < 1e-6 and again["outcome"] == "verified", told, again["error"])
+
+
 def test_flat_displacements_of_a_scene(s):
     answer = solved(s, SCENE)
     flat = {**answer, "displacements": [x for point in answer["displacements"] for x in point]}
