@@ -58,7 +58,7 @@ typedef struct {
     uz_settings settings;
     uz_hooks hooks; /* whether to go on, and nothing else */
     int64_t *list;
-    bool linear;
+    bool linear; /* some elements are, of the standard formulation */
 } finer;
 
 /* An element with the strain of its nodes' displacements. */
@@ -342,7 +342,8 @@ uz_status uz_look_at_few_elements(uz_result **results, const uz_problem *problem
     status = uz_body_model_build(&f.coarse, scene, UZ_BODY_OUTLINE, err);
     for (int64_t e = 0; status == UZ_OK && e < f.coarse.mesh.n_elements; e++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)f.coarse.mesh.kind[e]);
-        f.linear = type->nodes == type->corners && uz_element_formulation(&f.coarse, e) == UZ_FORMULATION_STANDARD;
+        f.linear = f.linear ||
+                   (type->nodes == type->corners && uz_element_formulation(&f.coarse, e) == UZ_FORMULATION_STANDARD);
     }
     if (status == UZ_OK)
         status = look_closer(results, &f, problem, cache, err);

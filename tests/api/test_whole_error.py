@@ -268,6 +268,23 @@ def test_nodes_that_no_load_moves_hide_nothing(s):
         check(mine["error"]["mesh"] == 1 and mine["quantities"][0]["high"] > best["energy"]["strain"] > 5e-4, mine["error"], mine["quantities"])
 
 
+def test_what_few_elements_are_told_does_not_depend_on_their_numbers(s):
+    """Of two formulations the last element's counted for all: 0.238 one way round, 0.260 the other."""
+    wide, high, told = 10, 5, []
+    nodes = [[3 * i / wide, j / high] for j in range(high + 1) for i in range(wide + 1)]
+    at = [[i + j * (wide + 1) for j in range(high + 1)] for i in range(wide + 1)]
+    elements = [[at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]] for i in range(wide) for j in range(high)]
+    for back in (False, True):
+        halves = [list(range(25)), list(range(25, 50))][::-1 if back else 1]
+        groups = {"inner": {"elements": halves[0]}, "outer": {"elements": halves[1]},
+                  "left": {"edges": [[a, b] for a, b in zip(at[0][1:], at[0])]}, "right": {"edges": [[a, b] for a, b in zip(at[wide], at[wide][1:])]}}
+        problem = {"kind": "scene", "model": "plane_strain", "kinematics": "fixed", "mesh": {"nodes": nodes, "elements": {"quad4": elements[::-1 if back else 1]}, "groups": groups},
+                   "materials": [{"on": "inner", "young": 1000, "poisson": 0.3}, {"on": "outer", "young": 1000, "poisson": 0.45}],
+                   "supports": [{"on": "left", "ux": 0, "uy": 0}], "loads": [{"on": "right", "traction": [0, -1]}]}
+        told.append(solved(s, {"problem": problem})["summary"]["error"]["mesh"])
+    check(abs(told[0] / told[1] - 1) < 1e-6, told)
+
+
 def test_a_coarse_mesh_is_warned_of_by_what_is_told(s):
     """The warning was of the estimate before few elements were looked at: there was none, or another value."""
     for element, force in (("hex8", [0, -2, 0]), ("hex8", [1, -2, 2])):
