@@ -97,8 +97,8 @@ char *codec_encode_deck(const codec_deck *deck); /* schemas/translation.json */
 /* How many reactions and displacements an answer has (a scene's: dim numbers for each node). False: *problem. */
 bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem);
 /* Whether what a scene is checked for takes milliseconds and megabytes. It grows with the nodes, and with the parts
- * (selections, supports, loads, contacts), each of which may be all of them: a short text can ask for gigabytes. What
- * is not light is left to the run, whose process has a bound on its memory. */
+ * (selections, supports, loads, ties, contacts), each of which may be all of them: a short text can ask for gigabytes,
+ * or minutes. What is not light is left to the run, whose process has a bound on its memory. */
 bool codec_request_is_light(const codec_request *request);
 
 /* The body of a refining job: `old` (a valid request) with the values of a POST /v1/jobs/{id}/refine body, and a start

@@ -141,7 +141,7 @@ bool codec_request_is_light(const codec_request *request)
     const uz_scene *scene = &request->problem.scene;
     const uz_box *box = &scene->box;
     const bool is_box = scene->source == UZ_MESH_BOX;
-    const int64_t parts = scene->n_selections + scene->n_supports + scene->n_loads + scene->n_contacts;
+    const int64_t parts = scene->n_selections + scene->n_supports + scene->n_loads + scene->n_ties + scene->n_contacts;
     double nodes = is_box ? 1 : (double)scene->given.n_nodes;
     for (int i = 0; is_box && i < box->dim; i++)
         nodes *= (double)box->cells[i] + 1.0;

@@ -204,6 +204,24 @@ TEST(obstacles)
 }
 
 /* The three ways in which a table of numbers comes out of the scanner: small, as a whole, in long rows. */
+TEST(every_kind_of_part_weighs)
+{
+    codec_request request = {.problem = {.kind = UZ_PROBLEM_SCENE}};
+    uz_scene *scene = &request.problem.scene;
+    int64_t *const parts[] = {&scene->n_selections, &scene->n_supports, &scene->n_loads, &scene->n_ties,
+                              &scene->n_contacts};
+    scene->source = UZ_MESH_BOX;
+    scene->box = (uz_box){.dim = 2, .cells = {99, 99}};
+    CHECK(codec_request_is_light(&request));
+    for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) {
+        *parts[k] = 1000;
+        CHECK(!codec_request_is_light(&request));
+        *parts[k] = 100;
+        CHECK(codec_request_is_light(&request));
+        *parts[k] = 0;
+    }
+}
+
 TEST(height_tables_of_every_size)
 {
     const int sizes[3][2] = {{3, 2}, {3, 200}, {200, 3}};
