@@ -111,8 +111,8 @@ PHRASES = {
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,
     "Mathematical Programming Computation 4, 2012": None,
     "a block squeezed by 30 %": None,  # tests/peers/large.py
-    "| 108,000 | 1.4 | 1.5 to 2.2 | 2.0 to 2.7 | 1.1 to 1.6 |": None, "| 335,000 | 4.3 | 3.6 to 3.7 | 5.9 | 0.84 to 0.85 |": None,  # by hand, on two processors
-    "| 1,012,000 | 15.9 to 17.9 | 10.8 to 11.2 | 18.1 to 18.6 | 0.62 to 0.68 |": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
+    "| 115,000 | 1.6 to 1.8 | 1.9 to 2.0 | 2.5 to 2.8 | 1.1 to 1.2 |": None, "| 335,000 | 3.8 to 4.2 | 3.7 to 3.8 | 6.0 to 6.2 | 0.90 to 0.98 |": None,  # by hand, on two processors
+    "| 1,012,000 | 13.0 to 14.0 | 9.9 to 10.8 | 16.4 to 17.9 | 0.71 to 0.80 |": None, "Of 346,000 dofs it takes 1.1 s": None, "alone takes 1.9 s for `distributed`, and each of two others 4 s": None,  # likewise
     "4,000 jobs of solids of 20 x 20 x 12 hex8 (93 MB each) over three daemons, nothing else on the machine: 98.8 % of the jobs that could hit did, by chance 80 %, and all of them took 0.47 of the time": None,  # tests/soak/daemons.py zipf 4000
     "(plane bodies of 16,000 dofs, solids of 5,000:": None,  # likewise
     # rules of the program
