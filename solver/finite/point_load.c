@@ -4,9 +4,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
+#include "scene/check.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -114,8 +114,7 @@ static uz_status find_point(point_at *x, const uz_body_model *model, const uz_sc
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
     double rest[3] = {0}, now[3] = {0}, M[9] = {0}, R[9], moment[3];
-    char where[96];
-    snprintf(where, sizeof where, "/loads/%lld/on", (long long)i);
+    const char *where = UZ_PLACE("loads", i, "on");
     *x = (point_at){.model = model, .load = &scene->loads[i], .first = dim == 2 ? 2 : 0, .turns = dim == 2 ? 1 : 3};
     const uz_group *group = uz_mesh_group(mesh, x->load->on, where, err);
     if (!group)
