@@ -232,15 +232,14 @@ UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_po
         for (int w = 0; w < wide; w++)
             force[i][w] = (four){0};
     for (int p = 0; p < rule->gauss; p += LANES) {
-        four F[3][3], Q[3][3], around = {0};
+        four F[3][3], P[3][3], around = {0};
         const four volume = *uz_four_from(&at->volume[p]);
         deformations(F, H, p, across, dim, ring);
         for (int i = 0; i < dim; i++) {
-            four P[3] = {{0}};
             for (int J = 0; J < dim; J++) {
-                P[J] = F[i][0] * *uz_four_from(&laws->S[COMPONENT[J][0]][p]);
+                P[i][J] = F[i][0] * *uz_four_from(&laws->S[COMPONENT[J][0]][p]);
                 for (int M = 1; M < dim; M++)
-                    P[J] += F[i][M] * *uz_four_from(&laws->S[COMPONENT[J][M]][p]);
+                    P[i][J] += F[i][M] * *uz_four_from(&laws->S[COMPONENT[J][M]][p]);
             }
             if (ring && i == 0) { /* on the axis u_r / r is the derivative along r */
                 const four hoop = F[2][2] * *uz_four_from(&laws->S[2][p]),
@@ -249,23 +248,10 @@ UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_po
                 four along = hoop;
                 for (int l = 0; l < LANES; l++)
                     along[l] = per_radius[l] > 0 ? 0 : along[l];
-                P[0] += along;
-            }
-            for (int l = 0; l < dim; l++) {
-                Q[i][l] = P[0] * *uz_four_from(&at->inverse[l][0][p]);
-                for (int J = 1; J < dim; J++)
-                    Q[i][l] += P[J] * *uz_four_from(&at->inverse[l][J][p]);
-                Q[i][l] *= volume;
+                P[i][0] += along;
             }
         }
-        for (int g = p; g < p + LANES && g < rule->gauss; g++)
-            for (int w = 0; w < wide; w++) {
-                for (int i = 0; i < dim; i++)
-                    for (int l = 0; l < dim; l++)
-                        force[i][w] += Q[i][l][g - p] * *uz_four_from(&rule->at_nodes[g][l][LANES * w]);
-                if (ring)
-                    force[0][w] += around[g - p] * *uz_four_from(&rule->at_nodes[g][3][LANES * w]);
-            }
+        uz_add_to_nodes(force, P, volume, around, rule, at, p, dim, ring);
     }
 }
 

@@ -102,4 +102,29 @@ UZ_INLINE void uz_find_gradients(uz_gradients H, const uz_finite_rule *rule, con
     }
 }
 
+/* force[axis][node] += what stresses do at four points from p on: P[axis][x] a volume, by local coordinates, times the
+ * slopes of nodes by these; around: of rings P[theta] volume / r, along the radius. */
+UZ_INLINE void uz_add_to_nodes(uz_four (*force)[UZ_ELEMENT_NODES / UZ_FINITE_LANES], uz_four P[3][3], uz_four volume,
+                               uz_four around, const uz_finite_rule *rule, const uz_rest *at, int p, int dim, bool ring)
+{
+    const int wide = (rule->nodes + UZ_FINITE_LANES - 1) / UZ_FINITE_LANES;
+    uz_four Q[3][3];
+    for (int i = 0; i < dim; i++)
+        for (int l = 0; l < dim; l++) {
+            Q[i][l] = P[i][0] * *uz_four_from(&at->inverse[l][0][p]);
+            for (int J = 1; J < dim; J++)
+                Q[i][l] += P[i][J] * *uz_four_from(&at->inverse[l][J][p]);
+            Q[i][l] *= volume;
+        }
+    for (int g = p; g < p + UZ_FINITE_LANES && g < rule->gauss; g++)
+        for (int w = 0; w < wide; w++) {
+            const int from = UZ_FINITE_LANES * w;
+            for (int i = 0; i < dim; i++)
+                for (int l = 0; l < dim; l++)
+                    force[i][w] += Q[i][l][g - p] * *uz_four_from(&rule->at_nodes[g][l][from]);
+            if (ring)
+                force[0][w] += around[g - p] * *uz_four_from(&rule->at_nodes[g][3][from]);
+        }
+}
+
 #endif

@@ -80,7 +80,6 @@ UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int di
 {
     const uz_finite_rule *rule = x->rule;
     const bool ring = dim == 2 && rule->model == UZ_AXISYMMETRIC;
-    const int wide = (rule->nodes + LANES - 1) / LANES;
     uz_rest rest;
     uz_gradients from, by;
     four sum[3][GROUPS] = {{{0}}};
@@ -88,7 +87,7 @@ UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int di
     uz_find_gradients(from, rule, &rest, x->u, dim, ring);
     uz_find_gradients(by, rule, &rest, x->step, dim, ring);
     for (int p = 0; p < rule->gauss; p += LANES) {
-        four H[3][3], h[3][3], Q[3][3], turning, strain, around = {0};
+        four H[3][3], h[3][3], turning, strain, around = {0};
         const four weight = x->element->lame.mu * *uz_four_from(&rest.volume[p]);
         for (int c = 0; c < dim; c++)
             for (int i = 0; i < dim; i++) {
@@ -96,26 +95,13 @@ UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int di
                 h[c][i] = *uz_four_from(&by[c][i][p]);
             }
         turn(&turning, &strain, H, h, dim);
-        for (int c = 0; c < dim; c++)
-            for (int l = 0; l < dim; l++) {
-                Q[c][l] = H[c][0] * *uz_four_from(&rest.inverse[l][0][p]);
-                for (int i = 1; i < dim; i++)
-                    Q[c][l] += H[c][i] * *uz_four_from(&rest.inverse[l][i][p]);
-                Q[c][l] *= weight;
-            }
         if (ring)
             around = weight * *uz_four_from(&by[2][2][p]) * *uz_four_from(&rest.per_radius[p]);
         for (int g = p; g < p + LANES && g < rule->gauss; g++) {
             out->turning += weight[g - p] * turning[g - p];
             out->strain += weight[g - p] * strain[g - p];
-            for (int w = 0; w < wide; w++) {
-                for (int c = 0; c < dim; c++)
-                    for (int l = 0; l < dim; l++)
-                        sum[c][w] += Q[c][l][g - p] * *uz_four_from(&rule->at_nodes[g][l][LANES * w]);
-                if (ring)
-                    sum[0][w] += around[g - p] * *uz_four_from(&rule->at_nodes[g][3][LANES * w]);
-            }
         }
+        uz_add_to_nodes(sum, H, weight, around, rule, &rest, p, dim, ring);
     }
     for (int a = 0; a < rule->nodes; a++)
         for (int c = 0; c < dim; c++)
