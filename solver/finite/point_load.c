@@ -212,18 +212,19 @@ static bool invert_few(double A[MOST_FUNCTIONALS][MOST_FUNCTIONALS], int n)
         int pivot = j;
         for (int i = j + 1; i < n; i++)
             pivot = fabs(A[i][j]) > fabs(A[pivot][j]) ? i : pivot;
-        for (int k = 0; k < n; k++) {
-            const double a = A[j][k], b = I[j][k];
-            A[j][k] = A[pivot][k];
-            I[j][k] = I[pivot][k];
-            A[pivot][k] = a;
-            I[pivot][k] = b;
-        }
-        if (A[j][j] == 0)
+        const double by = A[pivot][j];
+        if (by == 0)
             return false;
+        for (int k = 0; k < n; k++) {
+            const double a = A[pivot][k] / by, b = I[pivot][k] / by;
+            A[pivot][k] = A[j][k];
+            I[pivot][k] = I[j][k];
+            A[j][k] = a;
+            I[j][k] = b;
+        }
         for (int i = 0; i < n; i++) {
-            const double factor = i == j ? 1 - 1 / A[j][j] : A[i][j] / A[j][j];
-            for (int k = 0; k < n; k++) {
+            const double factor = A[i][j];
+            for (int k = 0; k < n && i != j; k++) {
                 A[i][k] -= factor * A[j][k];
                 I[i][k] -= factor * I[j][k];
             }

@@ -431,6 +431,19 @@ def test_soft_sides_go_with_their_points_as_the_whole_scene_turns(s):
     check(abs(ends[0] / ends[1] - 1) < 2e-3 and abs(ends[0] / euler - 1) < 0.01, ends, euler)
 
 
+def test_points_are_the_same_in_any_units(s):
+    """Of lengths in nanometres the tangent of a point was no number, and half of its digits were lost in micrometres."""
+    found = []
+    for length in (1.0, 1e5, 1e9, 1e-9):
+        request = body(("quad4",), [(6, 3)], [lambda x, y: [2 * length * x, length * y]], {"foot": [(0, "left")], "head": [(0, "right")]}, model="plane_strain",
+                       kinematics="finite", materials=[{**MATERIAL, "law": "neo_hooke", "young": 1 / length**2}], supports=[{"on": "foot", "ux": 0, "uy": 0}],
+                       thickness=length, loads=[{"on": "head", "force": [0.05, -0.05], "at": [2.5 * length, 0.8 * length], "moment": [0.01 * length]}])
+        one = answer(s, request, forces=False)
+        found.append(([[t / length for t in u] for u in one["displacements"]], one["summary"]["finite"]["qps"]))
+    off = max(math.dist(u, v) for one, _ in found[1:] for u, v in zip(one, found[0][0]))
+    check(off < 1e-7 and {qps for _, qps in found} == {found[0][1]}, off, [qps for _, qps in found])
+
+
 def test_two_opposite_forces_twist_a_bar(s):
     """In space, by a rigid end and by one that deforms: two dead forces beside it have the moment that a prescribed rotation takes."""
     n, clamp = {"ux": 0, "uy": 0, "uz": 0}, 60
