@@ -158,7 +158,7 @@ static uz_status prescribe_along(prescription *p, int64_t support, int64_t node,
             continue;
         if (dof[c] < 0 && (p->source[-1 - dof[c]] || (c == 0 && uz_is_on_axis(p->model, node)))) {
             known += share[c] * p->value[-1 - dof[c]];
-            size += fabs(share[c] * p->value[-1 - dof[c]]);
+            size += fabs(p->value[-1 - dof[c]]); /* also of one that n is across but for rounding */
         } else if (fabs(share[c]) > UZ_DEPENDENT && (own < 0 || fabs(share[c]) > fabs(share[own]))) {
             own = c;
         }
