@@ -71,22 +71,25 @@ static void place_of(double x[3], const uz_body_model *model, int64_t node, cons
         x[c] = c < dim ? model->mesh.xyz[node * dim + c] + (u ? u[node * dim + c] : 0) : 0;
 }
 
-/* Q: an orthonormal basis that goes with the group's anchors, in its columns. */
+/* Q: an orthonormal basis that goes with the group's anchors, in its columns. Differences of places and of
+ * displacements apart, so that how far the body is from the origin has no part in their rounding. */
 static void basis(double Q[9], const uz_body_model *model, const uz_rigid_group *group, const double *u)
 {
-    double x[3][3], e[3][3] = {{0}};
-    for (int a = 0; a < (model->mesh.dim == 2 ? 2 : 3); a++)
-        place_of(x[a], model, group->anchor[a], u);
-    for (int c = 0; c < 3; c++)
-        e[0][c] = x[1][c] - x[0][c];
+    const int dim = model->mesh.dim;
+    const double *xyz = model->mesh.xyz;
+    const int64_t from = group->anchor[0] * dim;
+    double side[2][3] = {{0}}, e[3][3] = {{0}};
+    for (int a = 0; a < (dim == 2 ? 1 : 2); a++)
+        for (int c = 0; c < dim; c++) {
+            const int64_t to = group->anchor[a + 1] * dim;
+            side[a][c] = (xyz[to + c] - xyz[from + c]) + (u ? u[to + c] - u[from + c] : 0);
+        }
+    memcpy(e[0], side[0], sizeof e[0]);
     uz_unit3(e[0]);
-    if (model->mesh.dim == 2) {
+    if (dim == 2) {
         e[2][2] = 1;
     } else {
-        double side[3];
-        for (int c = 0; c < 3; c++)
-            side[c] = x[2][c] - x[0][c];
-        uz_cross3(e[2], e[0], side);
+        uz_cross3(e[2], e[0], side[1]);
         uz_unit3(e[2]);
     }
     uz_cross3(e[1], e[2], e[0]);

@@ -270,7 +270,9 @@ void uz_finite_move_supports(bool *moved, uz_finite_run *run)
         const double here = uz_is_rigid(model, i / dim) ? 0 : uz_along_dof(model, i / dim, (int)(i % dim), u);
         const double way = at->given[-1 - dof] - here;
         const uz_csc *fixed = &run->tangent.K_fixed;
-        const double rounding = 1e-15 * (fabs(run->prescribed[-1 - dof]) + model->mesh.extent);
+        const uz_rigid_group *group = uz_is_rigid(model, i / dim) ? uz_rigid_group_of(model, i / dim) : NULL;
+        const double arm = group ? sqrt(uz_distance2(model->mesh.xyz + group->anchor[0] * dim, group->point, dim)) : 0;
+        const double rounding = 1e-15 * (fabs(run->prescribed[-1 - dof]) + model->mesh.extent + arm);
         *moved = *moved || fabs(way) > rounding;
         for (int64_t q = fixed->ptr[-1 - dof]; q < fixed->ptr[-dof]; q++)
             run->p[fixed->idx[q]] -= fixed->val[q] * way;

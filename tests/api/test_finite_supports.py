@@ -326,6 +326,22 @@ def test_rigid_groups_turn_freely_in_space(s):
     check(numpy.abs(numpy.column_stack((-u[:, 1], u[:, 0], u[:, 2])) - v).max() < 1e-7, numpy.abs(u).max())
 
 
+def test_rigid_groups_may_be_far_from_the_origin_and_from_their_points(s):
+    """Rounding of places had the supports move for ever: a body at y = 20 was called unstable under none of its load."""
+    def turned(shift, point, angle):
+        place = lambda x, y: (shift[0] + 2 * x, shift[1] + y)
+        request = body(["quad4"], [(4, 2)], [place], {"foot": [(0, "bottom")], "head": [(0, "top")]})
+        rigid = {"point": [a + b for a, b in zip(shift, point)], "ux": 0, "uy": 0, "rz": angle}
+        return answer(s, scene(mesh=request["problem"]["mesh"], supports=[{"on": "foot", "rigid": rigid}, {"on": "head", "ux": 0, "uy": -0.1}]), forces=False)["summary"]
+    for point, angle in (([0.3, 0], 3), ([1e4, 0], 1e-4)):
+        energies = []
+        for shift in ([0, 0], [0, 20], [1e3, -3e3]):
+            summary = turned(shift, point, angle)
+            check(summary["finite"]["steps"] == 1 and summary["finite"]["qps"] <= 6, shift, point, summary["finite"])
+            energies.append(summary["energy"]["strain"])
+        check(all(abs(one / energies[0] - 1) < 1e-9 for one in energies), energies)
+
+
 def test_a_rigid_side_rolls_on_an_obstacle(s):
     """A flat side that is free to turn, pressed on a circle: beside its middle it tilts, and moments about its point vanish; mirrored it
     tilts the other way."""
