@@ -19,6 +19,9 @@
 
 /* An obstacle that stands deeper in a side between rows than this part of its length: rows leave 0.01 at most. */
 #define CUTS_IN 0.03
+/* Forces that are less than this part of those by which the strain energy comes from the largest displacement are what
+ * equations leave, as of warmth, which holds itself. */
+#define LEAST_OF_ENERGY 1e-6
 /* What equations may have of the mesh's error in a balanced answer. */
 #define OF_MESH 0.1
 
@@ -281,6 +284,7 @@ static void take_greater(uz_small *out, double error, const char *in)
 uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small)
 {
     const uz_evaluation *here = result->evaluation, *there = small->evaluation;
+    const uz_finite *told = &result->summary.finite;
     const double energy = run->at.body.energy;
     double off = 0, most = 0;
     uz_small out = {.compared = true, .error = INFINITY, .in = "displacements", .load = run->found.load};
@@ -292,6 +296,8 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
     compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
     most = fmax(most, UZ_LEAST_FORCE * here->loads_size); /* of loads that hold each other supports have rounding */
+    if (told->displacement > 0)
+        most = fmax(most, fmax(LEAST_OF_ENERGY, told->residual) * energy / told->displacement);
     if (most > 0)
         take_greater(&out, off / most, "forces");
     take_greater(&out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
