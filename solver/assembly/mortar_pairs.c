@@ -325,8 +325,8 @@ static int compare_sizes(double x, double y)
 }
 
 /* What can't follow is last; the smaller one first, which ends on the other, then the softer, then the nearer to the
- * middle of the mesh: what does not depend on how nodes are numbered, nor on which of them is `on`, nor on the axes.
- * Then the lowest nodes. */
+ * middle of the mesh, then the one of fewer nodes, which is linear: what does not depend on how nodes are numbered, nor
+ * on which of them is `on`, nor on the axes. Then the lowest nodes. */
 static int by_order(const void *a, const void *b)
 {
     const zone_mark *x = a, *y = b;
@@ -336,6 +336,8 @@ static int by_order(const void *a, const void *b)
         return x->bound ? 1 : -1;
     if (area || stiffness || away)
         return area ? area : stiffness ? stiffness : away;
+    if (x->dofs != y->dofs)
+        return x->dofs < y->dofs ? -1 : 1;
     return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
                                 : (x->side > y->side) - (x->side < y->side);
 }
@@ -372,6 +374,7 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
         mark[z].bound = pair->in->tie && 2 * mark[z].held > mark[z].dofs;
         if (itself) {
             mark[z].area = mark[z].stiffness = 0;
+            mark[z].dofs = 0;
             continue;
         }
         mark[z].stiffness /= mark[z].area;
