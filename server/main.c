@@ -108,9 +108,10 @@ static bool read_secrets(service *s, const server_options *options, char *messag
     if (options->webhook_secret_file[0] && !webhook_read_secret(&s->hooks, options->webhook_secret_file, message, size))
         return false;
     if (options->audit_log[0]) {
-        const int fd = open(options->audit_log, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600);
+        const int fd = open(options->audit_log, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600);
+        const bool ready = fd >= 0 && fcntl(fd, F_SETFL, O_APPEND) == 0; /* only its opening does not wait */
         s->audit = (server_log){
-            .lock = PTHREAD_MUTEX_INITIALIZER, .stream = fd >= 0 ? fdopen(fd, "a") : NULL, .least = LOG_INFO};
+            .lock = PTHREAD_MUTEX_INITIALIZER, .stream = ready ? fdopen(fd, "a") : NULL, .least = LOG_INFO};
         if (!s->audit.stream) {
             snprintf(message, size, "cannot write the audit log %s: %s", options->audit_log, strerror(errno));
             return false;

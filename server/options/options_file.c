@@ -4,6 +4,8 @@
  * '#' begins a comment at the start of a line, or after a space outside quotes. */
 #include "options/options.h"
 
+#include "base/given_file.h"
+
 #include <errno.h>
 #include <string.h>
 
@@ -96,7 +98,7 @@ bool options_read_file(server_options *o, const char *path, char *message, size_
 {
     char text[OPTION_PATH + 256];
     line_place at = {.path = path, .message = message, .size = size};
-    FILE *file = fopen(path, "re");
+    FILE *file = given_file_open(path);
     if (!file) {
         snprintf(message, size, "cannot read the configuration %s: %s", path, strerror(errno));
         return false;

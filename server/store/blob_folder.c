@@ -135,7 +135,7 @@ static int folder_open(blobs *b, const char *id)
     errno = ENOMEM;
     if (asprintf(&path, "%s/%s", ((folder *)b)->path, id) < 0)
         return -1;
-    int fd = open(path, O_RDONLY | O_CLOEXEC), cause = errno;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), cause = errno;
     free(path);
     errno = cause;
     return fd;

@@ -1,4 +1,5 @@
 #include "work/webhook.h"
+#include "base/given_file.h"
 #include "codec/codec.h"
 #include "work/internal.h"
 
@@ -307,7 +308,7 @@ static void *tell_loop(void *arg)
 bool webhook_read_secret(webhook_options *out, const char *path, char *message, size_t size)
 {
     char text[SECRET_MAX + 2];
-    FILE *file = fopen(path, "rbe");
+    FILE *file = given_file_open(path);
     size_t len = file ? fread(text, 1, sizeof text, file) : 0;
     int cause = errno;
     bool ok = file && !ferror(file);

@@ -126,6 +126,26 @@ def test_a_configuration_that_could_not_start(s):
 
 
 @options(None)
+def test_pipes_that_nobody_writes_to(s):
+    """They are not waited for, whichever option names them; one that somebody writes to, as <(...) of a shell, is read."""
+    pipe = os.path.join(s.folder, "pipe")
+    os.mkfifo(pipe)
+    for arguments in (["--config", pipe], ["--token-file", pipe], ["--webhook-secret-file", pipe], ["--audit-log", pipe], ["--tls-cert", pipe, "--tls-key", pipe],
+                      ["--store", "postgresql://a@192.0.2.1/b", "--objects", "http://192.0.2.1/b", "--object-key-file", pipe]):
+        got = run(s, "--check-config", *arguments)
+        check(got.returncode > 0 and pipe in got.stderr, arguments, got)
+    for arguments in (["--check-db"], ["--backup", pipe + ".copy"], []):
+        got = run(s, "--db", pipe, *arguments)
+        check(got.returncode == 1 and "not a regular file" in got.stderr, arguments, got)
+    end, into = os.pipe()
+    os.write(into, b"workers = 3\n")
+    os.close(into)
+    got = subprocess.run(s.command("--check-config", "--config", f"/dev/fd/{end}"), pass_fds=[end], capture_output=True, text=True, timeout=30, check=False)
+    os.close(end)
+    check(got.returncode == 0 and "workers = 3" in got.stdout, got)
+
+
+@options(None)
 def test_the_sample_is_the_table(s):
     sample = (service.ROOT / "server/uzawad.conf.example").read_text(encoding="utf-8")
     check(run(s, "--example-config").stdout == sample, "write it again: uzawad --example-config")

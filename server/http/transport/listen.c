@@ -1,4 +1,5 @@
 /* listen.c: before the server starts: from "HOST:PORT" to a listening socket, and the certificate. */
+#include "base/given_file.h"
 #include "http/transport/connection.h"
 
 #include <errno.h>
@@ -102,7 +103,7 @@ enum { PEM_MOST = 1 << 20 };
 static char *read_text(const char *path, bool secret, char *message, size_t size)
 {
     struct stat st;
-    FILE *file = fopen(path, "re");
+    FILE *file = given_file_open(path);
     const bool open_to_all = file && secret && (fstat(fileno(file), &st) != 0 || (st.st_mode & S_IRWXO));
     char *text = file && !open_to_all ? malloc(PEM_MOST + 1) : NULL;
     if (open_to_all) {

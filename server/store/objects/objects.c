@@ -1,6 +1,7 @@
 /* objects.c: requests to an object store, by libcurl. */
 #include "store/objects/objects.h"
 #include "base/clock.h"
+#include "base/given_file.h"
 
 #include <curl/curl.h>
 #include <errno.h>
@@ -314,7 +315,7 @@ static bool read_keys(objects *o, const char *path, char *message, size_t size)
                      "the object store needs keys: give --object-key-file, or AWS_ACCESS_KEY_ID and "
                      "AWS_SECRET_ACCESS_KEY in the environment");
     } else {
-        FILE *file = fopen(path, "re");
+        FILE *file = given_file_open(path);
         const bool read = file && fgets(line, sizeof line, file) && fstat(fileno(file), &info) == 0;
         const int cause = errno;
         if (file)

@@ -122,7 +122,7 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
             for (int i = 0; i < n; i++) {
                 char path[sizeof folder + UPLOAD_ID_LEN + 2];
                 snprintf(path, sizeof path, "%s/%.64s", folder, ids[i]);
-                int fd = open(path, O_RDONLY | O_CLOEXEC);
+                int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
                 const store_status status = fd >= 0 ? blob_check(fd, ids[i]) : STORE_ERROR;
                 const int cause = errno;
                 if (fd >= 0)
@@ -164,9 +164,12 @@ static sqlite3 *open_file(const char *path, char *message, size_t size)
     sqlite3 *db = NULL;
     int version = 0;
     char why[300] = "";
+    struct stat st;
     char *absolute = realpath(path, NULL); /* SQLite would take "file:..." for a URI */
-    if (!absolute)
+    if (!absolute || stat(absolute, &st) != 0)
         snprintf(why, sizeof why, "cannot open the file: %s", strerror(errno));
+    else if (!S_ISREG(st.st_mode)) /* it would wait for somebody to write to a pipe */
+        snprintf(why, sizeof why, "it is not a regular file");
     else if (sqlite3_open_v2(absolute, &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK)
         snprintf(why, sizeof why, "cannot open the file: %s", file_format_why_unreadable(db));
     else if (sqlite3_busy_timeout(db, 5000) == SQLITE_OK && checksum_register(db) &&

@@ -56,7 +56,7 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
         s->trail.number = number; /* past those that are lost, so that they are told once */
     }
     if (ok && asprintf(&folder, "%s-spare", s->path) >= 0) {
-        s->spare = open(folder, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+        s->spare = open(folder, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
         sqlite_take_spare(s);
         free(folder);
     }

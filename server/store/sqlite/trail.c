@@ -25,7 +25,7 @@ static void first_line(sqlite3 *db, char out[48])
 static char *read_all(const char *path, size_t *len)
 {
     struct stat st;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     char *text = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) ? malloc((size_t)st.st_size + 1) : NULL;
     const ssize_t n = text ? pread(fd, text, (size_t)st.st_size, 0) : -1;
     if (fd >= 0)
@@ -91,7 +91,8 @@ void trail_open(trail *t, sqlite3 *db, const char *file)
     const bool ours = text && strncmp(text, t->first, strlen(t->first)) == 0;
     const bool cut = ours && text[len - 1] != '\n'; /* the next line must not go on with half a one */
     free(text);
-    t->fd = open(t->path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW | (ours ? 0 : O_TRUNC), 0600);
+    t->fd =
+        open(t->path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | (ours ? 0 : O_TRUNC), 0600);
     t->size = (int64_t)len;
     if (t->fd >= 0 && (!ours || cut) && !blob_write_all(t->fd, ours ? "\n" : t->first, ours ? 1 : strlen(t->first))) {
         close(t->fd);
