@@ -54,6 +54,25 @@ typedef struct {
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
 
+/* The daemon computes by one thread of OpenBLAS, which starts others before main: where memory is short they look for
+ * room for ever, and exit waits for them. Once started anew it has none; processes that solve have the environment that
+ * it was given. */
+static void start_without_blas_threads(bool anew)
+{
+    static const char THREADS[] = "OPENBLAS_NUM_THREADS", GIVEN[] = "UZAWAD_OPENBLAS_NUM_THREADS";
+    const char *threads = getenv(THREADS), *given = getenv(GIVEN);
+    if (anew) {
+        setenv(GIVEN, threads ? threads : "", 1);
+        setenv(THREADS, "1", 1);
+    } else if (given) {
+        if (given[0])
+            setenv(THREADS, given, 1);
+        else
+            unsetenv(THREADS);
+        unsetenv(GIVEN);
+    }
+}
+
 /* The signals are blocked in every thread, since METIS installs its own SIGTERM and SIGABRT handlers while it orders
  * and jumps out of them: blocked everywhere, these signals can't reach it. Threads that libraries start before main
  * (those of OpenBLAS) inherit nothing of this, but the signal mask survives exec: so the program starts itself once
@@ -72,7 +91,9 @@ static void own_signals(char **argv, sigset_t *signals)
     pthread_sigmask(SIG_BLOCK, &internal, NULL);
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is then met as a full disk is */
-    if (sigismember(&before, SIGTERM) && sigismember(&before, SIGABRT))
+    const bool anew = !sigismember(&before, SIGTERM) || !sigismember(&before, SIGABRT);
+    start_without_blas_threads(anew);
+    if (!anew)
         return;
     char path[4096];
     ssize_t len = readlink("/proc/self/exe", path, sizeof path - 1);
@@ -80,6 +101,7 @@ static void own_signals(char **argv, sigset_t *signals)
         path[len] = '\0';
         execv(path, argv); /* returns only on failure: then it runs as it is */
     }
+    start_without_blas_threads(false);
 }
 
 /* An address that others can reach needs tokens, or a word that says it is meant. */

@@ -148,6 +148,21 @@ def answers(s):
 
 
 @options(None)
+def test_little_memory(s):
+    """Threads of BLAS, which the daemon has no use for, waited for memory, and its end for them."""
+    if service.INSTRUMENTED:
+        raise Skip("shadow memory takes more")
+    limited = ["sh", "-c", 'ulimit -v 200000 && exec "$@"', "sh", *s.command("--listen", "127.0.0.1:0", "--db", os.path.join(s.folder, "limited.db"))]
+    with subprocess.Popen(limited, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as daemon:
+        try:
+            check(daemon.stdout.readline().startswith(b"listening on "))
+            daemon.terminate()
+            check(daemon.wait(timeout=service.PATIENT_S) == 0)
+        finally:
+            daemon.kill()
+
+
+@options(None)
 def test_ipv6(s):
     try:
         socket.create_server(("::1", 0), family=socket.AF_INET6).close()
