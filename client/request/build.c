@@ -33,6 +33,28 @@ static json_t *problem_of(client_session *s, json_t *request, const char *kind)
     return NULL;
 }
 
+/* The key of a mesh, by the name of its file; with another name by how it begins. What can't be told is sent as Gmsh's,
+ * and the service says what is wrong with it. */
+static const char *mesh_format(const char *path, const client_buffer *file)
+{
+    static const struct {
+        const char *ending, *key;
+    } NAMES[] = {{".msh", "gmsh"},    {".inp", "abaqus"},  {".bdf", "nastran"}, {".nas", "nastran"},
+                 {".dat", "nastran"}, {".fem", "nastran"}, {".vtu", "vtk"},     {".vtk", "vtk"}};
+    char begin[4096];
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (client_ends_in(path, NAMES[i].ending, true))
+            return NAMES[i].key;
+    const char *text = file->data ? file->data : "";
+    text += strncmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0; /* a byte order mark */
+    snprintf(begin, sizeof begin, "%s", text);
+    if (begin[0] == '*')
+        return "abaqus";
+    if (begin[0] == '<' || strncmp(begin, "# vtk", 5) == 0)
+        return "vtk";
+    return strcasestr(begin, "BEGIN BULK") || strstr(begin, "\nGRID") ? "nastran" : "gmsh";
+}
+
 client_exit client_put_file(client_session *s, json_t *to, const char *key, const char *path)
 {
     char message[512], id[65];
@@ -49,34 +71,10 @@ client_exit client_put_file(client_session *s, json_t *to, const char *key, cons
         code = client_upload_once(s, id, path, &file);
     if (!value && code == CLIENT_OK)
         value = json_pack("{s:s}", "upload", id);
-    free(file.data);
-    if (code == CLIENT_OK && json_object_set_new(to, key, value) != 0)
+    if (code == CLIENT_OK && json_object_set_new(to, key ? key : mesh_format(path, &file), value) != 0)
         code = client_complain(s, CLIENT_LOCAL, "no memory");
+    free(file.data);
     return code;
-}
-
-/* The key of a mesh, by the name of its file; with another name by how it begins. What can't be told is sent as Gmsh's,
- * and the service says what is wrong with it. */
-static const char *mesh_format(const char *path)
-{
-    static const struct {
-        const char *ending, *key;
-    } NAMES[] = {{".msh", "gmsh"},    {".inp", "abaqus"},  {".bdf", "nastran"}, {".nas", "nastran"},
-                 {".dat", "nastran"}, {".fem", "nastran"}, {".vtu", "vtk"},     {".vtk", "vtk"}};
-    char begin[4096];
-    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
-        if (client_ends_in(path, NAMES[i].ending, true))
-            return NAMES[i].key;
-    FILE *file = fopen(path, "rb");
-    const size_t length = file ? fread(begin, 1, sizeof begin - 1, file) : 0;
-    if (file)
-        fclose(file);
-    begin[length] = '\0';
-    if (begin[0] == '*')
-        return "abaqus";
-    if (begin[0] == '<' || strncmp(begin, "# vtk", 5) == 0)
-        return "vtk";
-    return strcasestr(begin, "BEGIN BULK") || strstr(begin, "\nGRID") ? "nastran" : "gmsh";
 }
 
 /* The key of a surface, by the name of its file. */
@@ -140,8 +138,7 @@ static client_exit put_files(client_session *s, json_t *request)
         if (!problem || !mesh)
             code = CLIENT_USAGE;
         else
-            code = client_is_cad(of_mesh) ? client_put_cad(s, mesh, of_mesh)
-                                          : client_put_file(s, mesh, mesh_format(of_mesh), of_mesh);
+            code = client_is_cad(of_mesh) ? client_put_cad(s, mesh, of_mesh) : client_put_file(s, mesh, NULL, of_mesh);
         if (problem)
             json_object_set(problem, "mesh", mesh);
         json_decref(mesh);

@@ -22,7 +22,8 @@ void client_bodies_clear(client_bodies *bodies);
 
 /* ---- the parts */
 
-/* The file as the text of a JSON string or as an upload, under the key. path NULL: nothing is put. */
+/* The file as the text of a JSON string or as an upload, under the key; key NULL: under that of the mesh that it is.
+ * path NULL: nothing is put. */
 client_exit client_put_file(client_session *s, json_t *to, const char *key, const char *path);
 /* By its name: a part from a CAD program (STEP, IGES, BREP). */
 bool client_is_cad(const char *path);

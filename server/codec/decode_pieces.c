@@ -89,7 +89,7 @@ bool decode_components(double out[3], decoding *d, const json_value *object, con
 
 /* ---- texts, in the request or uploaded before */
 
-bool decode_source_open(decode_source *out, decoding *d, const json_value *value)
+static bool open_source(decode_source *out, decoding *d, const json_value *value)
 {
     const json_value *upload = json_get(value, "upload");
     const char *id = json_text(upload);
@@ -131,6 +131,22 @@ bool decode_source_open(decode_source *out, decoding *d, const json_value *value
                       : "names an upload that could not be read.");
     d->problem->status = 500;
     return false;
+}
+
+/* Programs of Windows may begin a text by a byte order mark, which no format here has. */
+bool decode_source_open(decode_source *out, decoding *d, const json_value *value)
+{
+    static const char UTF8[] = "\xef\xbb\xbf", UTF16[2][3] = {"\xff\xfe", "\xfe\xff"};
+    if (!open_source(out, d, value))
+        return false;
+    if (out->len >= 3 && memcmp(out->data, UTF8, 3) == 0) {
+        out->data += 3;
+        out->len -= 3;
+    }
+    if (out->len < 2 || (memcmp(out->data, UTF16[0], 2) != 0 && memcmp(out->data, UTF16[1], 2) != 0))
+        return true;
+    decode_source_close(out);
+    return decode_refuse(d, "text_encoding", value, "is text in UTF-16: save it as UTF-8 or ASCII.");
 }
 
 void decode_source_close(decode_source *source)

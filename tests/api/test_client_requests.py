@@ -1,6 +1,7 @@
 """Requests that the client makes itself: from matrices and meshes, with values put in and varied.
 usage: test_client_requests.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import copy
 import gzip
 import hashlib
 import json
@@ -152,6 +153,38 @@ def test_mesh_from_a_file(server):
     check(done["summary"]["outcome"] == "converged" and done["summary"]["problem"]["d"] > 0, done)
     done = run(server.url, "submit", "-", "--mesh", "tests/data/springs_K.mtx", stdin=json.dumps(body), code=4)
     check("/problem/mesh/gmsh" in done.stderr, done.stderr)
+
+
+def test_a_text_of_another_system(server):
+    """By a byte order mark before it files were taken for another format, or refused; UTF-16 is told. A pipe is read once: what tells the
+    format of a mesh without a name was missing in it."""
+    body = scene()
+    body["problem"].update(supports=[{"on": "property_3", "ux": 0, "uy": 0, "uz": 0}], loads=[], contacts=[], model="solid")
+    del body["problem"]["mesh"], body["problem"]["thickness"]
+    with open("tests/data/meshes/meshio_hex20.bdf", encoding="utf-8") as file:
+        bulk = file.read()
+    for text, key in ((bulk, "nastran"), (INPUT_FILE, "abaqus"), (GMSH, "gmsh")):
+        asked = copy.deepcopy(body) if key == "nastran" else scene(problem={**body["problem"], "model": "plane_stress", "supports": [{"on": "LEFT" if key == "abaqus" else "left", "ux": 0, "uy": 0}]})
+        asked["problem"]["mesh"] = {key: text}
+        if key != "nastran":
+            asked["problem"]["materials"] = [{**asked["problem"]["materials"][0], "on": "Body" if key == "abaqus" else "body"}]
+        plain = server.post(asked, query="?validate=true")
+        asked["problem"]["mesh"] = {key: "\ufeff" + text}
+        marked = server.post(asked, query="?validate=true")
+        check(plain.status == marked.status and plain.json.get("d") == marked.json.get("d") and plain.json.get("line") == marked.json.get("line"), key, plain, marked)
+        digest = service.expect(server.request("POST", "/v1/uploads", text.encode("utf-16")), 201).json["id"]
+        asked["problem"]["mesh"] = {key: {"upload": digest}}
+        reply = service.expect(server.post(asked), 422, "text_encoding")
+        check("UTF-8" in reply.json["detail"] and reply.json["pointer"].startswith(f"/problem/mesh/{key}"), reply)
+    for mark in "", "\ufeff":
+        end, into = os.pipe()
+        with subprocess.Popen([CLIENT, "--server", server.url, "submit", "-", "--validate", "--mesh", f"/dev/fd/{end}"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, pass_fds=[end]) as client, open(into, "wb") as pipe:
+            os.close(end)
+            pipe.write((mark + bulk).encode())
+            pipe.close()
+            out, err = client.communicate(json.dumps(body).encode(), timeout=60)
+        check(client.returncode == 0 and b"valid" in out, out, err)
 
 
 def test_mesh_of_an_input_file(server):
