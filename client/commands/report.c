@@ -196,8 +196,8 @@ static void put_warnings(const report *r)
     put(r->to, "</ul>\n");
 }
 
-/* A picture of the service's. One that it does not have for this job (409), or of a body without an answer (422), is
- * left out. */
+/* A picture of the service's. One that it does not have for this job, or of a body without an answer (409), is left
+ * out. */
 static client_exit put_picture(const report *r, const char *suffix, const char *colour, const char *caption)
 {
     const client_query query[] = {{"colour", colour}, {"case", r->case_name}, {NULL, NULL}};
@@ -216,7 +216,7 @@ static client_exit put_picture(const report *r, const char *suffix, const char *
         put(r->to, "\"><figcaption class=\"muted\">");
         uz_buffer_put_escaped(r->to, caption);
         put(r->to, "</figcaption></figure>\n");
-    } else if (end != CLIENT_HTTP_ANSWERED || (reply.status != 409 && reply.status != 422)) {
+    } else if (end != CLIENT_HTTP_ANSWERED || reply.status != 409) {
         code = client_explain(r->s, end, &reply);
     }
     client_reply_clear(&reply);

@@ -74,6 +74,8 @@ static void reply_failure(const field_reader *reader, uz_status status, const uz
     } else if (status == UZ_ERR_CANCELLED) {
         reply->retry_after_s = 5;
         reply_refuse(reply, 503, "draining", "The server is shutting down", "the reply was not computed to its end");
+    } else if (status == UZ_ERR_NOT_FINITE) {
+        reply_refuse(reply, 409, "no_result", "The answer cannot be drawn", "%s", err->message);
     } else if (status == UZ_ERR_LIMIT && !err->where[0]) {
         reply_refuse(reply, 413, "result_too_large", "The result is too large for one reply", "%s", err->message);
     } else {

@@ -164,6 +164,8 @@ def test_a_case_that_nothing_presses_on(s):
             alone["problem"]["mesh"].update(mesh)
             check(math.isclose(ended(s, alone)["summary"]["contact"]["force"][1], of["summary"]["contact"]["force"][1], rel_tol=1e-7), name)
         of = expect(s.get(f"/v1/jobs/{job['id']}/result?case=lifted&fields=displacements"), 200).json
+        for picture in "deformed.svg", "surface":
+            expect(s.get(f"/v1/jobs/{job['id']}/{picture}?case=lifted"), 409, "no_result")
         check("along +y" in of["summary"]["message"] and set(sum(of["displacements"], [])) == {None}, of["summary"])
     check(error_of(s, block(cases=cases[1:3]))["pointer"] == "/cases/0/loads")
     springs = chain(1, 1)
