@@ -123,7 +123,8 @@ int main(int argc, char **argv)
         return (int)complain_usage(message, &options);
     client_exit code = run_command(&options);
     if (fflush(stdout) != 0 || ferror(stdout)) {
-        perror("uzawa: cannot write to standard output");
+        if (code != CLIENT_LOCAL) /* which has been told */
+            perror("uzawa: cannot write to standard output");
         return CLIENT_LOCAL;
     }
     return (int)code;

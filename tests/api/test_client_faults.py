@@ -283,7 +283,9 @@ def test_local_faults(_):
         assert len(fake.requests) == 0, "nothing is sent when the file cannot be read"
         if os.path.exists("/dev/full"):
             with open("/dev/full", "w") as full:
-                expect(run(fake.url, "result", ID, stdout=full), 11)
+                for words in ((), ("--format", "table")):
+                    done = expect(run(fake.url, "result", ID, *words, stdout=full), 11)
+                    assert done.stderr.count("cannot write") == 1, done.stderr
                 help_page = subprocess.run([CLIENT, "help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=30)
                 expect(help_page, 11)
 
