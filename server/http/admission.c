@@ -107,7 +107,8 @@ static bool check_request(const api *context, http_request *rq, problem_details 
                                                       token_equal(coding->value, coding->value_len, "x-gzip"))))))
         return problem_fill(problem, 415, "content_encoding", "The content coding is not supported",
                             to->streamed ? "send the body as it is, or with Content-Encoding: gzip"
-                                         : "send the body without Content-Encoding");
+                                         : "send the body without Content-Encoding; uploads may have gzip, and "
+                                           "meshes and matrices may be uploads");
     /* a body that any page could send is none of ours; without a body nothing is read */
     const body_type type = request_body_type(rq);
     const bool has_body = rq->chunked || rq->length > 0 || header_find(&rq->headers, "Content-Type", NULL);
