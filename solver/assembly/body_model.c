@@ -307,7 +307,7 @@ uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
     double *p = NULL, *h = NULL;
     uz_error_reset(err);
     if (scene->source == UZ_MESH_BOX && scene->box.automatic) {
-        const uz_grids grids = uz_grids_of_box(&scene->box, 0.0);
+        const uz_grids grids = uz_grids_of_scene(scene, 0.0);
         first.box = uz_grid(&grids, grids.first);
     }
     scene = &first;

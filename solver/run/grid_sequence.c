@@ -159,8 +159,7 @@ uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem,
     grid next = {.box = scene->box};
     uz_status status = check(&g, starts, err);
     if (status == UZ_OK && chosen) {
-        const bool limited = scene->model == UZ_SOLID && uz_may_be_finite(scene);
-        g.grids = uz_grids_of_box(&scene->box, limited ? UZ_MOST_FINITE_DOFS : MOST_DOFS);
+        g.grids = uz_grids_of_scene(scene, MOST_DOFS);
         g.grids.order *= settings->quantity_error > 0.0 ? 2 : 1; /* of a product of two errors in the energy norm */
         next = (grid){.box = uz_grid(&g.grids, g.grids.first), .n = g.grids.first};
     }

@@ -1,6 +1,8 @@
 #include "scene/grids.h"
 
 #include "scene/box.h"
+#include "scene/check.h"
+#include "scene/scene.h"
 
 #include <math.h>
 
@@ -11,6 +13,9 @@ enum { FIRST_LINEAR = 4, FIRST_QUADRATIC = 2 };
 /* A coarsest grid of square cells beyond these has longer ones instead. */
 #define FIRST_CELLS_2D 4096.0
 #define FIRST_CELLS_3D 8192.0
+/* And beyond this part of the dofs that there may be: by longer ones yet, step by step. */
+#define FIRST_PART 0.5
+#define LONGER     1.1
 
 /* The next grid is aimed at a little less than what is asked for: missing it by a hair would take another one. */
 #define AIM 0.97
@@ -33,6 +38,15 @@ static double count_cells(const uz_box *box, double length, int64_t least)
     for (int axis = 0; axis < box->dim; axis++)
         count *= fmax((double)least, box->size[axis] / length);
     return count;
+}
+
+/* Cells of this length on the coarsest grid. */
+static void take_length(uz_grids *grids, double length)
+{
+    for (int axis = 0; axis < grids->box.dim && axis < 3; axis++) {
+        const double cells = grids->box.size[axis] / length / (double)grids->first;
+        grids->per_n[axis] = cells > 0.0 && isfinite(cells) ? cells : 1.0;
+    }
 }
 
 uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
@@ -61,11 +75,16 @@ uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
                 length = middle;
         }
     }
-    for (int axis = 0; axis < box->dim && axis < 3; axis++) {
-        const double cells = box->size[axis] / length / (double)grids.first;
-        grids.per_n[axis] = cells > 0.0 && isfinite(cells) ? cells : 1.0;
-    }
+    take_length(&grids, length);
+    for (; uz_grid_dofs(&grids, grids.first) > FIRST_PART * grids.most_dofs && length < longest; length *= LONGER)
+        take_length(&grids, LONGER * length);
     return grids;
+}
+
+uz_grids uz_grids_of_scene(const uz_scene *scene, double most_dofs)
+{
+    const bool limited = scene->model == UZ_SOLID && uz_may_be_finite(scene);
+    return uz_grids_of_box(&scene->box, limited ? UZ_MOST_FINITE_DOFS : most_dofs);
 }
 
 uz_box uz_grid(const uz_grids *grids, int64_t n)

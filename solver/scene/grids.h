@@ -19,6 +19,8 @@ typedef struct {
 
 /* most_dofs <= 0: what a scene may have. A box that cannot be meshed has grids all the same: the mesh refuses them. */
 uz_grids uz_grids_of_box(const uz_box *box, double most_dofs);
+/* Those of its box. Solids that may have large deformation have fewer dofs. */
+uz_grids uz_grids_of_scene(const uz_scene *scene, double most_dofs);
 /* The box with the cells of grid n. */
 uz_box uz_grid(const uz_grids *grids, int64_t n);
 /* Displacements of its nodes. */

@@ -146,6 +146,10 @@ def test_cells_are_chosen(s):
             "loads": [{"on": "top", "traction": [0.1, 0, 0]}]}
     limit = s.solve({**beam(**cube), "solver": {"accuracy": {"total": 0.01}}})["summary"]
     check(limit["outcome"] == "mesh_limit" and "more than 20000 unknowns" in limit["message"] and limit["finite"]["load"] == 1, limit["message"])
+    plate = {**cube, "mesh": {"box": {"size": [40, 40, 1], "cells": "auto"}}, "supports": [{"on": "left", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "right", "traction": [0.01, 0, 0]}]}
+    for kinematics in ("finite", "auto"):  # a flat one began with more than that
+        first = solved(s, {**beam(**plate, kinematics=kinematics), "solver": {"accuracy": {"total": 0.5}}})["mesh"]["ladder"][0]
+        check(first["d"] < 12000 and first["cells"][2] >= 2 and first["cells"][0] > 10, first)
 
 
 if __name__ == "__main__":
