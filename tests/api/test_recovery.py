@@ -13,6 +13,8 @@ import os
 import random
 import resource
 import signal
+import subprocess
+import tempfile
 import threading
 import time
 
@@ -383,6 +385,31 @@ def test_a_result_waits_for_room_on_the_disk(s):
     job = s.wait_status(job, "successful", "failed")
     check(job["attempts"] == 1 and job["summary"]["outcome"] == "time_limit", job)
     check(s.solve(MATRICES)["status"] == "successful")
+
+
+@options(None)
+def test_a_start_on_a_full_disk(s):
+    """What is kept for deletions lets the service start, too, and delete; without it the refusal says what is lacking."""
+    script = '''mount -t tmpfs -o size=8m tmpfs "$1" && cd "$1" || exit 77
+        begin() {
+            : >"$3/out"
+            "$2" --listen 127.0.0.1:0 --db a.db --workers 1 >"$3/out" 2>"$3/log" & one=$!
+            while kill -0 $one 2>/dev/null && [ ! -s "$3/out" ]; do sleep 0.1; done
+            kill $one 2>/dev/null; wait $one; cat "$3/out"
+        }
+        begin "$@"; cat /dev/zero >fill 2>/dev/null; stat -c %s a.db-spare
+        begin "$@"; stat -c %s a.db-spare
+        begin "$@"; rm a.db-spare; cat /dev/zero >more 2>/dev/null
+        begin "$@"; cat "$3/log" >&2'''
+    with tempfile.TemporaryDirectory() as beside:
+        got = subprocess.run(["unshare", "-rm", "sh", "-c", script, "sh", s.folder, os.path.abspath(s.command()[0]), beside], capture_output=True, text=True,
+                             timeout=service.PATIENT_S, check=False)
+    if got.returncode == 77 or "unshare" in got.stderr:
+        raise service.Skip("no file system can be mounted here")
+    lines = got.stdout.splitlines()
+    check([line.startswith("listening on ") for line in lines] == [True, False, True, False, True], got)
+    check(int(lines[1]) == 4 << 20 and int(lines[3]) > 3 << 20, lines)
+    check("no room" in got.stderr.splitlines()[-1], got.stderr)
 
 
 if __name__ == "__main__":

@@ -74,6 +74,10 @@ store_status sqlite_write(sqlite_store *s, write_durability durability, store_ch
 void sqlite_run_batch(void *ctx, batch_change *first);
 /* Takes the spare room, if there is any to take. Before other threads, or under writer_lock. */
 void sqlite_take_spare(sqlite_store *s);
+/* Has the disk of an open file hardly any room? */
+bool sqlite_is_full(int fd);
+/* On a full disk, for a start: leaves a part of the spare room free. */
+void sqlite_lend_spare(sqlite_store *s);
 
 /* ---- sync.c */
 bool sqlite_sync_begin(sqlite_store *s); /* once the writer has read the file; false: no thread, or no log */

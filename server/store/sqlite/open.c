@@ -16,16 +16,23 @@
 
 /* ---- opening */
 
+static const char NO_ROOM[] = "; there is no room on its disk";
+enum { SPARE_FLAGS = O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK };
+
 static bool open_connections(sqlite_store *s, const char *path, char *message, size_t size)
 {
     int version = 0;
-    char *folder = NULL;
+    char *folder = NULL, *spare = NULL;
     sqlite3_stmt *stmt = NULL;
     s->path = realpath(path, NULL); /* absolute: SQLite would take "file:..." for a URI */
     if (!s->path) {
         snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
         return false;
     }
+    if (asprintf(&spare, "%s-spare", s->path) < 0)
+        spare = NULL;
+    s->spare = spare ? open(spare, SPARE_FLAGS) : -1;
+    sqlite_lend_spare(s);
     bool ok = connection_open(&s->writer, s->path, true, message, size) &&
               file_format_check(s->writer.db, &version, message, size);
     if (ok) { /* the journal must be WAL: readers then never wait for the writer */
@@ -55,11 +62,11 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
         trail_open(&s->trail, s->writer.db, s->path);
         s->trail.number = number; /* past those that are lost, so that they are told once */
     }
-    if (ok && asprintf(&folder, "%s-spare", s->path) >= 0) {
-        s->spare = open(folder, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
+    if (ok && s->spare < 0 && spare)
+        s->spare = open(spare, SPARE_FLAGS | O_CREAT, 0600);
+    if (ok)
         sqlite_take_spare(s);
-        free(folder);
-    }
+    free(spare);
     for (int i = 0; ok && i < STORE_READERS; i++) {
         ok = connection_open(&s->readers[i], s->path, false, message, size);
         s->readers_free[s->n_readers_free] = &s->readers[i];
@@ -119,6 +126,8 @@ store *sqlite_open(const char *path, char *message, size_t size)
         snprintf(message, size, "another daemon is using this file; stop it or give another path");
     else /* a file system without flock (ENOLCK, EOPNOTSUPP) is used unguarded */
         ok = open_connections(s, path, message, size);
+    if (!ok && s->path && sqlite_is_full(s->file) && strlen(message) + sizeof NO_ROOM <= size)
+        strcat(message, NO_ROOM);
     if (ok && !sqlite_sync_begin(s)) {
         snprintf(message, size, "cannot start a thread");
         ok = false;

@@ -7,6 +7,8 @@
 
 #include <fcntl.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 typedef struct {
@@ -49,11 +51,29 @@ static bool is_failure(store_status status)
 /* What a deletion writes: the pages that held the rows' keys, those that list the free ones (one for a thousand), and
  * all of it once more when the journal is moved. */
 #define SPARE_BYTES ((off_t)4 << 20)
+/* What of it a start may have, as SQLite opens no file without room for its log beside it. */
+#define LENT_BYTES ((off_t)1 << 19)
+
+bool sqlite_is_full(int fd)
+{
+    struct statvfs disk;
+    return fstatvfs(fd, &disk) == 0 && (off_t)(disk.f_bavail * disk.f_frsize) < LENT_BYTES;
+}
+
+void sqlite_lend_spare(sqlite_store *s)
+{
+    struct stat st;
+    const bool whole = s->spare >= 0 && fstat(s->spare, &st) == 0 && st.st_size == SPARE_BYTES;
+    if (whole && sqlite_is_full(s->spare) && ftruncate(s->spare, SPARE_BYTES - LENT_BYTES) != 0)
+        return; /* the start will say what it lacks */
+}
 
 void sqlite_take_spare(sqlite_store *s)
 {
+    struct stat st;
     if (s->spare >= 0 && !s->spare_there)
-        s->spare_there = posix_fallocate(s->spare, 0, SPARE_BYTES) == 0;
+        s->spare_there = posix_fallocate(s->spare, 0, SPARE_BYTES) == 0 ||
+                         (fstat(s->spare, &st) == 0 && st.st_size >= SPARE_BYTES - LENT_BYTES);
 }
 
 /* The change by itself; on a full disk once more when the journal is moved into the database, and where the change
