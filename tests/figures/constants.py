@@ -122,6 +122,8 @@ PHRASES = {
     "the answer by more than 5 % in the energy norm": None, "`sliding` from 5 % on.": None,  # the same
     "one of them is more than 2 % it tries another": constant(0.02, r"#define TRIED +([\d.]+)"),
     "a tolerance of 1e-24 of the terms": None, "off by up to 0.2 %.": None,  # what was
+    "was told to err by 99 % in forces": None,  # what was
+    "300 of all kinds in other words": lambda program: "other words\", 300)" in (program.root / "tests/extremes/generated_words.py").read_text(),
     "and 300 of bodies on obstacles": lambda program: "on obstacles\", 300)" in (program.root / "tests/extremes/generated_obstacles.py").read_text(),
     "1,000 generated scenes of bodies": lambda program: "most=1000)" in (program.root / "tests/extremes/generated_contacts.py").read_text(),
     "to be 2 % of its length deep": constant(0.02, r"#define SINK +([\d.]+)"),
