@@ -88,9 +88,9 @@ uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t 
  * keep it, then nodes, and the others get ".nodes" or ".elements" behind it.
  * Source: CalculiX CrunchiX user's manual. */
 uz_status uz_abaqus_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
-/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh", "abaqus", "nastran", "vtk";
- * NULL: by what it looks like.
- * UZ_ERR_UNSUPPORTED: there is none. */
+/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh", "abaqus", "nastran",
+ * "vtk".
+ * UZ_ERR_UNSUPPORTED: there is none of that name. */
 uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
                        uz_error *err);
 
@@ -104,8 +104,8 @@ typedef struct {
 void uz_triangles_clear(uz_triangles *triangles);
 /* Reads a surface: "stl" (ASCII or binary; normals follow from the order of corners, and a file in which most of those
  * that it states contradict it is refused), or "obj" (Wavefront: v and f; polygons are divided into triangles from
- * their first corner, names, materials, texture and normals are passed over; curves and free-form surfaces refused);
- * NULL: by what it looks like. Corners that are no farther apart than 1e-6 of the surface's size are made one, as
+ * their first corner, names, materials, texture and normals are passed over; curves and free-form surfaces refused).
+ * Corners that are no farther apart than 1e-6 of the surface's size are made one, as
  * numbers in texts are rounded. max_bytes as of uz_gmsh_read. Errors: UZ_ERR_FORMAT, _UNSUPPORTED, _NOT_FINITE and
  * _LIMIT with the line (of a binary file the message says the triangle), _MEMORY. */
 uz_status uz_triangles_read(uz_triangles *out, const char *format, const char *text, size_t len, size_t max_bytes,

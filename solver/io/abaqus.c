@@ -436,12 +436,6 @@ static uz_status to_given(uz_given_mesh *out, abaqus_file *file, int64_t **new_e
 
 /* ---- the file */
 
-bool uz_abaqus_recognises(const char *text, size_t len)
-{
-    abaqus_text lines = {.at = text, .end = text + len};
-    return abaqus_next_line(&lines) && abaqus_is_keyword(&lines);
-}
-
 void abaqus_clear(abaqus_file *file)
 {
     for (int64_t i = 0; i < file->n_sets; i++) {

@@ -280,17 +280,6 @@ static uz_status read_header(gmsh_file *file)
     return status == UZ_OK ? gmsh_section_end(text, "MeshFormat") : status;
 }
 
-bool uz_gmsh_recognises(const char *text, size_t len)
-{
-    static const char *const FIRST[] = {"$MeshFormat", "$Comments", "$NOD" /* version 1, which is refused */};
-    for (; len > 0 && strchr(" \t\r\n", *text) && *text; len--)
-        text++;
-    for (size_t i = 0; i < sizeof FIRST / sizeof FIRST[0]; i++)
-        if (len >= strlen(FIRST[i]) && memcmp(text, FIRST[i], strlen(FIRST[i])) == 0)
-            return true;
-    return false;
-}
-
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
     gmsh_file file = {.text = {text, text, text + len, 1, false, err}, .max_bytes = max_bytes};

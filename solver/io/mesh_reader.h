@@ -7,8 +7,6 @@
 
 typedef struct {
     const char *name; /* as uz_mesh_read is asked for it: "gmsh" */
-    /* Does a file that begins like this have the format? Looks at no more than it needs, and never fails. */
-    bool (*recognises)(const char *text, size_t len);
     /* Reads a whole file. `text` may be anything, and counts in it are not to be trusted; max_bytes bounds what the
      * mesh may take (0: no bound). *out is for uz_given_mesh_clear, and empty on failure: elements have VTK's order of
      * nodes (the descriptors of element/element_type.h have that of the format), nodes and elements are numbered from 0
@@ -18,11 +16,7 @@ typedef struct {
 } uz_mesh_reader;
 
 /* Rows of the table. */
-bool uz_gmsh_recognises(const char *text, size_t len);
-bool uz_abaqus_recognises(const char *text, size_t len);
-bool uz_vtk_recognises(const char *text, size_t len);
 uz_status uz_vtk_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
-bool uz_nastran_recognises(const char *text, size_t len);
 uz_status uz_nastran_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 
 #endif

@@ -465,17 +465,6 @@ static int64_t bulk_line(const char *text, size_t len, const char **behind)
     return 0;
 }
 
-bool uz_nastran_recognises(const char *text, size_t len)
-{
-    nastran n = {.at = text, .end = text + (len < 1 << 16 ? len : 1 << 16)};
-    for (next_line(&n); n.length > 0; next_line(&n)) {
-        const char *word = n.line + strspn(n.line, " ");
-        if (strncmp(word, "BEGIN", 5) == 0 || strncmp(n.line, "GRID", 4) == 0)
-            return true;
-    }
-    return false;
-}
-
 uz_status uz_nastran_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
     nastran n = {.end = text + len, .err = err, .mesh = {.max_bytes = max_bytes, .err = err}};

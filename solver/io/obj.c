@@ -12,17 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool triangles_obj_recognises(const char *text, size_t len)
-{
-    triangles_text words = {.next = text, .end = text + len};
-    const char *word;
-    size_t length;
-    for (int lines = 0; lines < 1000 && triangles_next_line(&words); lines++)
-        if (triangles_word(&word, &length, &words) && triangles_is(word, length, "v"))
-            return true;
-    return false;
-}
-
 typedef struct {
     triangles_in *in;
     triangles_text text;

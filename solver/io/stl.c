@@ -36,11 +36,6 @@ static bool begins_solid(const char *text, size_t len)
     return triangles_next_line(&words) && triangles_word(&word, &length, &words) && triangles_is(word, length, "solid");
 }
 
-bool triangles_stl_recognises(const char *text, size_t len)
-{
-    return is_bytes(text, len) || begins_solid(text, len);
-}
-
 /* How the normals that the file states agree with the order of corners. */
 typedef struct {
     int64_t agree, against, first_line;

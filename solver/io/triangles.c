@@ -10,11 +10,10 @@
 
 static const struct {
     const char *name;
-    bool (*recognises)(const char *text, size_t len);
     uz_status (*read)(triangles_in *in, const char *text, size_t len);
 } READERS[] = {
-    {"stl", triangles_stl_recognises, triangles_stl_read},
-    {"obj", triangles_obj_recognises, triangles_obj_read},
+    {"stl", triangles_stl_read},
+    {"obj", triangles_obj_read},
 };
 
 void uz_triangles_clear(uz_triangles *triangles)
@@ -224,10 +223,10 @@ uz_status uz_triangles_read(uz_triangles *out, const char *format, const char *t
     uz_error_reset(err);
     memset(out, 0, sizeof *out);
     for (size_t i = 0; i < sizeof READERS / sizeof READERS[0] && !read; i++)
-        if (format ? strcmp(READERS[i].name, format) == 0 : READERS[i].recognises(text, len))
+        if (strcmp(READERS[i].name, format) == 0)
             read = READERS[i].read;
     if (!read)
-        return uz_fail(err, UZ_ERR_UNSUPPORTED, "", "the file looks like no surface that is read: STL, or OBJ");
+        return uz_fail(err, UZ_ERR_UNSUPPORTED, "", "surfaces of the format \"%.32s\" are not read", format);
     uz_status status = read(&in, text, len);
     if (status == UZ_OK && out->n == 0)
         status = uz_fail(err, UZ_ERR_FORMAT, "", "there are no triangles in the file");

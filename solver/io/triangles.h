@@ -30,9 +30,7 @@ bool triangles_is(const char *word, size_t len, const char *what);
 uz_status triangles_reals(double x[3], triangles_text *text, const char *what, uz_error *err);
 
 /* Rows of the table. */
-bool triangles_stl_recognises(const char *text, size_t len);
 uz_status triangles_stl_read(triangles_in *in, const char *text, size_t len);
-bool triangles_obj_recognises(const char *text, size_t len);
 uz_status triangles_obj_read(triangles_in *in, const char *text, size_t len);
 
 #endif

@@ -203,13 +203,6 @@ static const char *skip_blanks(const char *text, const char *end)
     return text;
 }
 
-bool uz_vtk_recognises(const char *text, size_t len)
-{
-    const char *at = skip_blanks(text, text + len);
-    const size_t left = len - (size_t)(at - text);
-    return (left > 0 && *at == '<') || (left >= 5 && memcmp(at, "# vtk", 5) == 0);
-}
-
 uz_status uz_vtk_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
     cells mesh = {.max_bytes = max_bytes, .err = err};

@@ -25,11 +25,15 @@ static inline const uz_given_group *find_given(const uz_given_mesh *mesh, const 
     return &none;
 }
 
-/* By the reader that its beginning asks for. */
+/* In the format that its beginning says. */
 static inline void read_text(uz_given_mesh *mesh, const char *text)
 {
+    const char *format = strstr(text, "$MeshFormat")    ? "gmsh"
+                         : *text == '*'                 ? "abaqus"
+                         : *text == '<' || *text == '#' ? "vtk"
+                                                        : "nastran";
     uz_error err = {0};
-    CHECK_MSG(uz_mesh_read(mesh, NULL, text, strlen(text), 0, &err) == UZ_OK, "line %lld: %s", (long long)err.line,
+    CHECK_MSG(uz_mesh_read(mesh, format, text, strlen(text), 0, &err) == UZ_OK, "line %lld: %s", (long long)err.line,
               err.message);
 }
 

@@ -134,7 +134,7 @@ TEST(a_file_of_meshio)
     FILE *in = fopen("tests/data/meshes/meshio_hex20.bdf", "rb");
     const size_t len = in ? fread(text, 1, sizeof text - 1, in) : 0;
     CHECK(in && fclose(in) == 0 && len > 0);
-    CHECK_MSG(uz_mesh_read(&given, NULL, text, len, 0, &err) == UZ_OK, "line %lld: %s", (long long)err.line,
+    CHECK_MSG(uz_mesh_read(&given, "nastran", text, len, 0, &err) == UZ_OK, "line %lld: %s", (long long)err.line,
               err.message);
     CHECK(given.n_elements == 2 && given.kind[0] == UZ_HEX20 && given.n_nodes == 32);
     check_middles(&given);

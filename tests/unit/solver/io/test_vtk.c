@@ -30,7 +30,7 @@ TEST(files_of_meshio)
         uz_mesh mesh;
         uz_error err = {0};
         const size_t len = load(text, FILES[i]);
-        CHECK_MSG(uz_mesh_read(&given, NULL, text, len, 0, &err) == UZ_OK, "%s, line %lld: %s", FILES[i],
+        CHECK_MSG(uz_mesh_read(&given, "vtk", text, len, 0, &err) == UZ_OK, "%s, line %lld: %s", FILES[i],
                   (long long)err.line, err.message);
         CHECK(given.n_elements == 2 && given.kind[1] == UZ_HEX20 && given.n_nodes == 32);
         CHECK(given.from_file && strcmp(given.from_file, "/mesh/vtk") == 0);
@@ -93,7 +93,7 @@ TEST(forms_of_paraview)
     for (size_t i = 0; i < sizeof TEXTS / sizeof TEXTS[0]; i++) {
         uz_given_mesh given;
         uz_error err = {0};
-        CHECK_MSG(uz_mesh_read(&given, NULL, TEXTS[i], strlen(TEXTS[i]), 0, &err) == UZ_OK, "%zu, line %lld: %s", i,
+        CHECK_MSG(uz_mesh_read(&given, "vtk", TEXTS[i], strlen(TEXTS[i]), 0, &err) == UZ_OK, "%zu, line %lld: %s", i,
                   (long long)err.line, err.message);
         CHECK(given.n_elements == 1 && given.kind[0] == UZ_TET4 && given.node[3] == 3 && given.xyz[3] == 1.0);
         CHECK_INT(find_given(&given, "part_7")->n_elements, 1);
@@ -187,7 +187,7 @@ TEST(pixels_and_voxels)
         uz_given_mesh given;
         uz_mesh mesh;
         uz_error err = {0};
-        CHECK_MSG(uz_mesh_read(&given, NULL, text, strlen(text), 0, &err) == UZ_OK, "%s", err.message);
+        CHECK_MSG(uz_mesh_read(&given, "vtk", text, strlen(text), 0, &err) == UZ_OK, "%s", err.message);
         CHECK(given.n_elements == 1 && given.kind[0] == (dim == 3 ? UZ_HEX8 : UZ_QUAD4));
         CHECK(memcmp(given.node, AROUND, (dim == 3 ? 8 : 4) * sizeof *AROUND) == 0);
         if (dim == 3)

@@ -202,7 +202,7 @@ TEST(corners_that_are_rounded_apart_are_one)
                                          "endloop\nendfacet\nendsolid\n";
     uz_triangles t;
     uz_error err = {0};
-    const uz_status status = uz_triangles_read(&t, NULL, FILE_TEXT, strlen(FILE_TEXT), 0, &err);
+    const uz_status status = uz_triangles_read(&t, "stl", FILE_TEXT, strlen(FILE_TEXT), 0, &err);
     CHECK_MSG(status == UZ_OK, "%s", err.message);
     CHECK(t.n == 2 && t.left_out == 1 && t.x[1] == t.x[3] && t.x[2] == t.x[5] && t.y[2] == t.y[5]);
     CHECK(uz_triangles_check(&t, false, &err) == UZ_OK);
