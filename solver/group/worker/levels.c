@@ -205,7 +205,7 @@ static void make_finest(spread_system *s, spread_rows *rows)
 /* ---- the way to the next one */
 
 /* of_level (here x b x k): the modes of S K S are S^-1 times K's, here times the least of S, so that none overflows. */
-static float *scale_modes(const spread_system *s, const spread_rows *rows)
+static float *scale_modes(const spread_system *s, spread_rows *rows)
 {
     float *scaled = new_zeros(s->near.here * s->b * s->k, sizeof *scaled);
     double least = INFINITY;
@@ -215,6 +215,8 @@ static float *scale_modes(const spread_system *s, const spread_rows *rows)
     for (int64_t i = 0; i < s->near.here * s->b; i++)
         for (int c = 0; c < s->k; c++)
             scaled[i * s->k + c] = (float)(least / s->scale[i] * (double)rows->mode[i * s->k + c]);
+    free(rows->mode);
+    rows->mode = NULL;
     return scaled;
 }
 
@@ -245,7 +247,7 @@ static void *gather(const void *own, int64_t count, size_t each, int64_t *total)
 }
 
 /* aggregate, basis: of own nodes and ghosts, the former numbered over all processes. */
-static void aggregate_nodes(spread_system *s, const spread_rows *rows, int32_t *aggregate, float *basis)
+static void aggregate_nodes(spread_system *s, spread_rows *rows, int32_t *aggregate, float *basis)
 {
     uz_error err = {0};
     uz_level own = s->level;
@@ -331,11 +333,12 @@ static void scale_ghosts(spread_system *s, double factor)
 
 /* ---- sums over processes */
 
-/* Blocks that are not 0 of all processes. */
+/* Blocks of all processes, one after the other. */
 typedef struct {
-    int64_t count;
-    int32_t *at;   /* count x 2: row and column */
-    double *value; /* count x k x k */
+    int rank, size;
+    int64_t *first; /* size + 1: of each process */
+    int32_t *at;    /* first[size] x 2: row and column */
+    double **own;   /* this process's: where their numbers are */
 } block_list;
 
 static bool is_zero(const double *block, int64_t size)
@@ -346,61 +349,90 @@ static bool is_zero(const double *block, int64_t size)
     return c == size;
 }
 
-static void list_block(block_list *list, int64_t row, int64_t column, const double *block, int64_t size)
-{
-    if (is_zero(block, size))
-        return;
-    list->at[2 * list->count] = (int32_t)row;
-    list->at[2 * list->count + 1] = (int32_t)column;
-    memcpy(list->value + list->count++ * size, block, (size_t)size * sizeof *block);
-}
-
-static block_list gather_blocks(const uz_blocks *part)
+/* zeros: those that are 0, too. */
+static block_list list_blocks(const uz_blocks *part, bool zeros)
 {
     const int64_t size = (int64_t)part->b * part->b, most = part->nodes + part->ptr[part->nodes];
-    block_list own = {.at = new_zeros(2 * most, sizeof *own.at), .value = new_zeros(most * size, sizeof *own.value)},
-               all;
-    for (int64_t a = 0; a < part->nodes; a++) {
-        for (int64_t e = part->ptr[a]; e < part->ptr[a + 1]; e++)
-            list_block(&own, a, part->idx[e], part->off + e * size, size);
-        list_block(&own, a, a, part->diag + a * size, size);
-    }
-    all.at = gather(own.at, 2 * own.count, sizeof *own.at, &all.count);
-    all.value = gather(own.value, own.count * size, sizeof *own.value, &all.count);
-    all.count /= size;
-    free(own.at);
-    free(own.value);
-    return all;
+    int32_t *at = new_zeros(2 * most, sizeof *at);
+    int64_t count = 0, all;
+    block_list list = {.own = new_zeros(most, sizeof *list.own)};
+    MPI_Request request;
+    for (int64_t a = 0; a < part->nodes; a++)
+        for (int64_t e = part->ptr[a]; e <= part->ptr[a + 1]; e++) {
+            const bool diagonal = e == part->ptr[a + 1];
+            double *block = diagonal ? part->diag + a * size : part->off + e * size;
+            if (!zeros && is_zero(block, size))
+                continue;
+            at[2 * count] = (int32_t)a;
+            at[2 * count + 1] = diagonal ? (int32_t)a : part->idx[e];
+            list.own[count++] = block;
+        }
+    MPI_Comm_rank(MPI_COMM_WORLD, &list.rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &list.size);
+    list.first = new_zeros(list.size + 1, sizeof *list.first);
+    MPI_Iallgather(&count, 1, MPI_INT64_T, list.first + 1, 1, MPI_INT64_T, MPI_COMM_WORLD, &request);
+    wait_for(1, &request);
+    for (int p = 0; p < list.size; p++)
+        list.first[p + 1] += list.first[p];
+    list.at = gather(at, count, 2 * sizeof *at, &all);
+    free(at);
+    return list;
 }
 
 static void free_list(block_list *list)
 {
+    free(list->first);
     free(list->at);
-    free(list->value);
+    free(list->own);
 }
 
-static void add_list(uz_blocks *to, const block_list *list, double factor)
+/* Blocks of all processes that pass at once: all of them would need more room than their sum. */
+enum { BLOCKS_AT_ONCE = 1 << 13 };
+
+static void add_list(uz_blocks *to, const block_list *list)
 {
-    const int64_t size = (int64_t)to->b * to->b;
-    for (int64_t q = 0; q < list->count; q++) {
-        const int32_t row = list->at[2 * q], column = list->at[2 * q + 1];
-        double *block = row == column ? to->diag + row * size : to->off + uz_blocks_find(to, row, column) * size;
-        for (int64_t c = 0; c < size; c++)
-            block[c] += factor * list->value[q * size + c];
+    const int64_t size = (int64_t)to->b * to->b, some = list->size < BLOCKS_AT_ONCE ? BLOCKS_AT_ONCE / list->size : 1;
+    int64_t most = 0;
+    int *count = new_zeros(list->size, sizeof *count), *first = new_zeros(list->size, sizeof *first);
+    for (int p = 0; p < list->size; p++)
+        most = list->first[p + 1] - list->first[p] > most ? list->first[p + 1] - list->first[p] : most;
+    double *value = new_zeros(list->size * (most < some ? most : some) * size, sizeof *value);
+    for (int64_t from = 0; from < most; from += some) {
+        MPI_Request request;
+        for (int p = 0, at = 0; p < list->size; at += count[p++]) {
+            const int64_t left = list->first[p + 1] - list->first[p] - from;
+            count[p] = (int)((left < 0 ? 0 : left < some ? left : some) * size);
+            first[p] = at;
+        }
+        for (int64_t q = 0; q * size < count[list->rank]; q++)
+            memcpy(value + first[list->rank] + q * size, list->own[from + q], (size_t)size * sizeof *value);
+        MPI_Iallgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, value, count, first, MPI_DOUBLE, MPI_COMM_WORLD, &request);
+        wait_for(1, &request);
+        for (int p = 0; p < list->size; p++)
+            for (int64_t q = 0; q * size < count[p]; q++) {
+                const int32_t *at = list->at + 2 * (list->first[p] + from + q);
+                double *block =
+                    at[0] == at[1] ? to->diag + at[0] * size : to->off + uz_blocks_find(to, at[0], at[1]) * size;
+                for (int64_t c = 0; c < size; c++)
+                    block[c] += value[first[p] + q * size + c];
+            }
     }
+    free(value);
+    free(count);
+    free(first);
 }
 
 static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int k)
 {
-    const int64_t size = (int64_t)k * k;
+    const int64_t size = (int64_t)k * k, blocks = list->first[list->size];
     int64_t *start = new_zeros(nodes + 2, sizeof *start), count = 0;
     *sum = (uz_blocks){.nodes = nodes, .b = k, .ptr = new_zeros(nodes + 1, sizeof *sum->ptr)};
-    for (int64_t q = 0; q < list->count; q++)
+    for (int64_t q = 0; q < blocks; q++)
         start[list->at[2 * q] + 2] += list->at[2 * q] != list->at[2 * q + 1];
     for (int64_t a = 0; a < nodes; a++)
         start[a + 2] += start[a + 1];
     sum->idx = new_zeros(start[nodes + 1], sizeof *sum->idx);
-    for (int64_t q = 0; q < list->count; q++)
+    for (int64_t q = 0; q < blocks; q++)
         if (list->at[2 * q] != list->at[2 * q + 1])
             sum->idx[start[list->at[2 * q] + 1]++] = list->at[2 * q + 1];
     for (int64_t a = 0; a < nodes; a++) { /* sorted, each once */
@@ -413,7 +445,7 @@ static void sum_lists(uz_blocks *sum, const block_list *list, int64_t nodes, int
     free(start);
     sum->off = new_zeros(count * size + 4, sizeof *sum->off);
     sum->diag = new_zeros(nodes * size + 4, sizeof *sum->diag);
-    add_list(sum, list, 1.0);
+    add_list(sum, list);
 }
 
 /* ---- what each process has whole */
@@ -495,11 +527,12 @@ static void free_variant(spread_system *s, int which)
     *v = (variant){0};
 }
 
-static void coarsen(spread_system *s, const spread_rows *rows)
+static void coarsen(spread_system *s, spread_rows *rows)
 {
     uz_level *level = &s->level;
     uz_error err = {0};
     uz_below below;
+    uz_blocks part; /* of the next matrix: this process's */
     const int64_t nodes = level->A.nodes, here = s->near.here;
     int32_t *aggregate = new_zeros(nodes, sizeof *aggregate);
     float *basis = new_zeros(nodes * s->b * s->k, sizeof *basis);
@@ -521,15 +554,13 @@ static void coarsen(spread_system *s, const spread_rows *rows)
     free(basis);
     fetch_prolongation(s);
     scale_ghosts(s, 0.5);
-    must(uz_galerkin(&s->part, level, &below, s->k, NULL, NULL, &err), &err);
+    must(uz_galerkin(&part, level, &below, s->k, NULL, NULL, &err), &err);
     scale_ghosts(s, 2.0);
     uz_below_clear(&below);
-    block_list list = gather_blocks(&s->part);
+    block_list list = list_blocks(&part, true);
     sum_lists(&s->next, &list, level->aggregates, s->k);
     free_list(&list);
-    free(s->part.off);
-    free(s->part.diag);
-    s->part.off = s->part.diag = NULL;
+    uz_blocks_clear(&part);
 }
 
 static void make_room(spread_system *s)
@@ -562,6 +593,10 @@ void system_create(spread_system *s, spread_rows *rows)
     memcpy(s->variant[VARIANT_WHOLE].inverse, s->level.inverse, (size_t)end * sizeof(float));
     if (s->next.nodes > 0)
         set_coarse(&s->variant[VARIANT_WHOLE], make_coarse(s, &s->next), &s->near);
+    if (system_levels(s, VARIANT_WHOLE) > 2) { /* of the next matrix its places alone are asked for again */
+        free(s->next.off);
+        s->next.off = NULL;
+    }
     make_room(s);
 }
 
@@ -574,11 +609,28 @@ static uz_blocks zeros_like(const uz_blocks *A)
     return made;
 }
 
-/* What is coarser than the finest level, less what holding dofs takes from it. One level alone is factored anew. */
-static void lose(spread_system *s, variant *v, const block_list *list)
+/* A, of which each process has its part in the places of all. */
+static void sum_parts(uz_blocks *A)
+{
+    const int64_t size = (int64_t)A->b * A->b;
+    block_list list = list_blocks(A, false);
+    const int64_t count = list.first[list.rank + 1] - list.first[list.rank];
+    double *own = new_zeros(count * size, sizeof *own);
+    for (int64_t q = 0; q < count; q++) {
+        memcpy(own + q * size, list.own[q], (size_t)size * sizeof *own);
+        memset(list.own[q], 0, (size_t)size * sizeof *own);
+        list.own[q] = own + q * size;
+    }
+    add_list(A, &list);
+    free(own);
+    free_list(&list);
+}
+
+/* What is coarser than the finest level, less what holding dofs takes from the next matrix: `loss`, which is taken. One
+ * level alone is factored anew. */
+static void lose(spread_system *s, variant *v, uz_blocks *loss)
 {
     const variant *whole = &s->variant[VARIANT_WHOLE];
-    uz_blocks A = zeros_like(&s->next);
     uz_error err = {0};
     if (whole->base->levels > 1) {
         size_t bytes;
@@ -586,19 +638,19 @@ static void lose(spread_system *s, variant *v, const block_list *list)
         if (!v->room)
             end_group("no memory");
         v->base = whole->base;
-        add_list(&A, list, 1.0);
         const uz_team team = team_of(s);
-        must(uz_hold_loss(v->room, v->base, &A, &team, &err), &err);
+        must(uz_hold_loss(v->room, v->base, loss, &team, &err), &err);
         shared_init(&v->shared, v->base, v->room, &s->near);
         return;
     }
-    const int64_t size = (int64_t)A.b * A.b;
-    memcpy(A.off, s->next.off, (size_t)(A.ptr[A.nodes] * size) * sizeof *A.off);
-    memcpy(A.diag, s->next.diag, (size_t)(A.nodes * size) * sizeof *A.diag);
-    add_list(&A, list, -1.0);
-    set_coarse(v, make_coarse(s, &A), &s->near);
-    free(A.off);
-    free(A.diag);
+    const int64_t size = (int64_t)loss->b * loss->b;
+    for (int64_t e = 0; e < loss->ptr[loss->nodes] * size; e++)
+        loss->off[e] = s->next.off[e] - loss->off[e];
+    for (int64_t e = 0; e < loss->nodes * size; e++)
+        loss->diag[e] = s->next.diag[e] - loss->diag[e];
+    set_coarse(v, make_coarse(s, loss), &s->near);
+    free(loss->off);
+    free(loss->diag);
 }
 
 void system_hold(spread_system *s, const char *held)
@@ -616,22 +668,19 @@ void system_hold(spread_system *s, const char *held)
     free(all);
     if (!s->variant[VARIANT_WHOLE].base)
         return;
-    uz_blocks loss = zeros_like(&s->part);
+    uz_blocks loss = zeros_like(&s->next);
     scale_ghosts(s, 0.5);
     if (!uz_level_loss(&loss, &s->level, v->inverse))
         end_group("no memory");
     scale_ghosts(s, 2.0);
-    block_list list = gather_blocks(&loss);
-    free(loss.off);
-    free(loss.diag);
-    lose(s, v, &list);
-    free_list(&list);
+    sum_parts(&loss);
+    lose(s, v, &loss);
 }
 
 static int64_t blocks_bytes(const uz_blocks *A)
 {
     const int64_t size = (int64_t)A->b * A->b;
-    return A->ptr ? A->ptr[A->nodes] * (4 + 8 * size) + A->nodes * (8 + 8 * size) : 0;
+    return A->ptr ? A->ptr[A->nodes] * (4 + (A->off ? 8 * size : 0)) + A->nodes * (8 + 8 * size) : 0;
 }
 
 int64_t system_bytes(const spread_system *s, int which)
@@ -663,7 +712,6 @@ void system_free(spread_system *s)
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
         free(own[k]);
     uz_blocks_clear(&level->A);
-    uz_blocks_clear(&s->part);
     uz_blocks_clear(&s->next);
     neighbours_free(&s->near);
     memset(s, 0, sizeof *s);

@@ -78,8 +78,7 @@ typedef struct {
     int64_t faces;  /* own nodes with ghosts, */
     int32_t *face;  /* which */
     float *outside; /* here x b: the absolute sums of what is coupled with ghosts */
-    uz_blocks part; /* where this process's share of the next matrix has numbers */
-    uz_blocks next; /* the next matrix */
+    uz_blocks next; /* the next matrix; without numbers off the diagonal where there are coarser ones */
     float *modes;   /* next.nodes x k x k: of that */
     variant variant[VARIANTS];
     int lanes; /* of the solve at hand: 1 or LANES */
@@ -109,7 +108,7 @@ typedef struct {
     int b, k;
     double strong;
 } spread_rows;
-/* Frees the blocks of the rows once the finest level has them. */
+/* Frees the blocks and modes of the rows once they are in the levels. */
 void system_create(spread_system *s, spread_rows *rows);
 /* From now on VARIANT_HELD is without the dofs that held (here x b) marks. */
 void system_hold(spread_system *s, const char *held);
