@@ -286,8 +286,8 @@ static void subtract_numbers(void *ctx, int64_t begin, int64_t end)
         x->to[e] = (float)((double)x->from[e] - x->loss[e]);
 }
 
-/* The level without what it loses, in arrays of its own. */
-static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss, size_t *bytes)
+/* The level without what it loses, in arrays of its own. lost (nodes): rows of `loss` that are not 0; NULL: any. */
+static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss, const bool *lost, size_t *bytes)
 {
     const int b = level->A.b;
     const int64_t size = (int64_t)b * b, n = level->A.nodes * b, off = level->A.ptr[level->A.nodes] * size,
@@ -297,7 +297,15 @@ static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss
     own->inverse = uz_alloc(n, sizeof *own->inverse);
     if (!own->off || !own->diag || !own->inverse)
         return false;
-    uz_by_pieces(subtract_numbers, &(difference){own->off, level->off, loss->off}, off);
+    if (!lost) {
+        uz_by_pieces(subtract_numbers, &(difference){own->off, level->off, loss->off}, off);
+    } else {
+        memcpy(own->off, level->off, (size_t)off * sizeof *own->off);
+        for (int64_t i = 0; i < level->A.nodes; i++)
+            if (lost[i])
+                subtract_numbers(&(difference){own->off, level->off, loss->off}, level->A.ptr[i] * size,
+                                 level->A.ptr[i + 1] * size);
+    }
     uz_by_pieces(subtract_numbers, &(difference){own->diag, level->diag, loss->diag}, diag);
     memset(own->off + off, 0, 8 * sizeof *own->off);
     memset(own->diag + diag, 0, 8 * sizeof *own->diag);
@@ -364,10 +372,11 @@ void uz_release_levels(uz_multigrid_room *room)
     room->coarsest = NULL;
 }
 
-/* room->own from level `from` on, whose loss stands in `loss`, which is taken. */
-static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from, uz_blocks *loss, size_t *bytes,
-                      const uz_team *team, const uz_stop *stop, uz_error *err)
+/* room->own from level `from` on, not the last, whose loss stands in `first`; lost: see subtract. */
+static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from, const uz_blocks *first,
+                      const bool *lost, size_t *bytes, const uz_team *team, const uz_stop *stop, uz_error *err)
 {
+    uz_blocks loss = *first;
     uz_status status = UZ_OK;
     for (int l = from; status == UZ_OK && l < mg->base.levels; l++) {
         uz_blocks next = {0};
@@ -375,42 +384,48 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
             status = fail_memory(mg->base.n, err);
         else if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
-        else if (l > from && !pass_on(&next, loss, &mg->level[l - 1], team))
+        else if (l > from && !pass_on(&next, &loss, &mg->level[l - 1], team))
             status = fail_memory(mg->base.n, err);
         if (l > from) {
-            free(loss->off);
-            free(loss->diag);
-            *loss = next;
+            if (loss.off != first->off) {
+                free(loss.off);
+                free(loss.diag);
+            }
+            loss = next;
         }
-        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], loss, bytes))
+        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], &loss, l == from ? lost : NULL, bytes))
             status = fail_memory(mg->base.n, err);
     }
     if (status == UZ_OK)
-        status = factor(room, &mg->level[mg->base.levels - 1], loss, stop ? stop->hooks : NULL, err);
+        status = factor(room, &mg->level[mg->base.levels - 1], &loss, stop ? stop->hooks : NULL, err);
     if (status == UZ_OK && room->coarsest)
         *bytes += uz_factor_describe(room->coarsest).bytes;
-    free(loss->off);
-    free(loss->diag);
+    if (loss.off != first->off) {
+        free(loss.off);
+        free(loss.diag);
+    }
     return status;
 }
 
-uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, const uz_team *team,
-                       uz_error *err)
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, const bool *lost,
+                       const uz_team *team, uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     const uz_level *level = &mg->level[0];
     const int b = level->A.b;
     size_t bytes = 0;
-    for (int64_t j = 0; j < base->n; j++) /* slots are numbered as dofs are: see there */
-        for (int64_t i = uz_slot_node(mg, mg->slot[j]), e = level->A.ptr[i] - 1; e < level->A.ptr[i + 1]; e++) {
+    for (int64_t j = 0; j < base->n; j++) { /* slots are numbered as dofs are: see there */
+        const int64_t i = uz_slot_node(mg, mg->slot[j]);
+        for (int64_t e = level->A.ptr[i] - 1; (!lost || lost[i]) && e < level->A.ptr[i + 1]; e++) {
             const int64_t c = e < level->A.ptr[i] ? i : level->A.idx[e];
             double *row =
                 (c == i ? loss->diag + i * b * b : loss->off + e * b * b) + uz_slot_place(mg, mg->slot[j]) * b;
             for (int q = 0; q < b; q++)
                 row[q] *= mg->scale[j] * mg->scale[c * b + q];
         }
+    }
     uz_release_levels(room);
-    return lose(room, mg, 0, loss, &bytes, team, NULL, err);
+    return lose(room, mg, 0, loss, lost, &bytes, team, NULL, err);
 }
 
 uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
@@ -427,17 +442,11 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
         if (held[j])
             inverse[uz_slot_number(mg, mg->slot[j])] = 0.0F;
     *bytes += 4 * (size_t)slots;
-    if (status == UZ_OK && !init_loss(&loss, &mg->level[1])) {
-        free(loss.off);
-        free(loss.diag);
-        return fail_memory(mg->base.n, err);
-    }
-    if (status != UZ_OK)
-        return status;
-    if (!uz_level_loss(&loss, finest, inverse)) {
-        free(loss.off);
-        free(loss.diag);
-        return fail_memory(mg->base.n, err);
-    }
-    return lose(room, mg, 1, &loss, bytes, NULL, stop, err);
+    if (status == UZ_OK && (!init_loss(&loss, &mg->level[1]) || !uz_level_loss(&loss, finest, inverse)))
+        status = fail_memory(mg->base.n, err);
+    if (status == UZ_OK)
+        status = lose(room, mg, 1, &loss, NULL, bytes, NULL, stop, err);
+    free(loss.off);
+    free(loss.diag);
+    return status;
 }

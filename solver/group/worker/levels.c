@@ -609,8 +609,8 @@ static uz_blocks zeros_like(const uz_blocks *A)
     return made;
 }
 
-/* A, of which each process has its part in the places of all. */
-static void sum_parts(uz_blocks *A)
+/* A, of which each process has its part in the places of all. any (nodes): rows that have something. */
+static void sum_parts(uz_blocks *A, bool *any)
 {
     const int64_t size = (int64_t)A->b * A->b;
     block_list list = list_blocks(A, false);
@@ -622,13 +622,15 @@ static void sum_parts(uz_blocks *A)
         list.own[q] = own + q * size;
     }
     add_list(A, &list);
+    for (int64_t q = 0; q < list.first[list.size]; q++)
+        any[list.at[2 * q]] = true;
     free(own);
     free_list(&list);
 }
 
-/* What is coarser than the finest level, less what holding dofs takes from the next matrix: `loss`, which is taken. One
+/* What is coarser than the finest level, less what holding dofs takes from the next matrix: s->loss, in these rows. One
  * level alone is factored anew. */
-static void lose(spread_system *s, variant *v, uz_blocks *loss)
+static void lose(spread_system *s, variant *v, const bool *lost)
 {
     const variant *whole = &s->variant[VARIANT_WHOLE];
     uz_error err = {0};
@@ -639,18 +641,29 @@ static void lose(spread_system *s, variant *v, uz_blocks *loss)
             end_group("no memory");
         v->base = whole->base;
         const uz_team team = team_of(s);
-        must(uz_hold_loss(v->room, v->base, loss, &team, &err), &err);
+        must(uz_hold_loss(v->room, v->base, &s->loss, lost, &team, &err), &err);
         shared_init(&v->shared, v->base, v->room, &s->near);
         return;
     }
-    const int64_t size = (int64_t)loss->b * loss->b;
-    for (int64_t e = 0; e < loss->ptr[loss->nodes] * size; e++)
-        loss->off[e] = s->next.off[e] - loss->off[e];
-    for (int64_t e = 0; e < loss->nodes * size; e++)
-        loss->diag[e] = s->next.diag[e] - loss->diag[e];
-    set_coarse(v, make_coarse(s, loss), &s->near);
-    free(loss->off);
-    free(loss->diag);
+    uz_blocks A = zeros_like(&s->next);
+    const int64_t size = (int64_t)A.b * A.b;
+    for (int64_t e = 0; e < A.ptr[A.nodes] * size; e++)
+        A.off[e] = s->next.off[e] - s->loss.off[e];
+    for (int64_t e = 0; e < A.nodes * size; e++)
+        A.diag[e] = s->next.diag[e] - s->loss.diag[e];
+    set_coarse(v, make_coarse(s, &A), &s->near);
+    free(A.off);
+    free(A.diag);
+}
+
+static void clear_rows(uz_blocks *A, const bool *any)
+{
+    const int64_t size = (int64_t)A->b * A->b;
+    for (int64_t a = 0; a < A->nodes; a++)
+        if (any[a]) {
+            memset(A->off + A->ptr[a] * size, 0, (size_t)((A->ptr[a + 1] - A->ptr[a]) * size) * sizeof *A->off);
+            memset(A->diag + a * size, 0, (size_t)size * sizeof *A->diag);
+        }
 }
 
 void system_hold(spread_system *s, const char *held)
@@ -668,13 +681,17 @@ void system_hold(spread_system *s, const char *held)
     free(all);
     if (!s->variant[VARIANT_WHOLE].base)
         return;
-    uz_blocks loss = zeros_like(&s->next);
+    bool *lost = new_zeros(s->next.nodes, sizeof *lost);
+    if (!s->loss.ptr)
+        s->loss = zeros_like(&s->next);
     scale_ghosts(s, 0.5);
-    if (!uz_level_loss(&loss, &s->level, v->inverse))
+    if (!uz_level_loss(&s->loss, &s->level, v->inverse))
         end_group("no memory");
     scale_ghosts(s, 2.0);
-    sum_parts(&loss);
-    lose(s, v, &loss);
+    sum_parts(&s->loss, lost);
+    lose(s, v, lost);
+    clear_rows(&s->loss, lost);
+    free(lost);
 }
 
 static int64_t blocks_bytes(const uz_blocks *A)
@@ -711,6 +728,8 @@ void system_free(spread_system *s)
     free_variant(s, VARIANT_WHOLE);
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
         free(own[k]);
+    free(s->loss.off); /* its places are those of next */
+    free(s->loss.diag);
     uz_blocks_clear(&level->A);
     uz_blocks_clear(&s->next);
     neighbours_free(&s->near);

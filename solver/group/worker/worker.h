@@ -79,6 +79,7 @@ typedef struct {
     int32_t *face;  /* which */
     float *outside; /* here x b: the absolute sums of what is coupled with ghosts */
     uz_blocks next; /* the next matrix; without numbers off the diagonal where there are coarser ones */
+    uz_blocks loss; /* in its places: 0 but while dofs are held */
     float *modes;   /* next.nodes x k x k: of that */
     variant variant[VARIANTS];
     int lanes; /* of the solve at hand: 1 or LANES */

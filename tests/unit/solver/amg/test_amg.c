@@ -613,7 +613,9 @@ TEST(a_loss_of_the_matrix)
     CHECK(p.info.levels > 1);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, before, r, &err) == UZ_OK);
     half_of(&half, &p);
-    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, NULL, &err) == UZ_OK);
+    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, NULL, NULL, &err) == UZ_OK);
+    free(half.off);
+    free(half.diag);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, after, r, &err) == UZ_OK);
     for (int64_t j = 0; j < n; j++) {
         most = fmax(most, fabs(before[j]));
@@ -623,6 +625,39 @@ TEST(a_loss_of_the_matrix)
     free(r);
     free(before);
     free(after);
+    close_pair(&p);
+}
+
+/* Who says which rows have lost something gets what who does not gets. */
+TEST(a_loss_of_some_rows)
+{
+    pair p = open_brick((int64_t[]){11, 9, 7}, (double[]){1, 1, 1}, 0.3);
+    const int64_t n = p.K.cols;
+    double *r = random_vector(n, 3), *told = vector(n), *whole = vector(n), *found = vector(n);
+    bool *lost = calloc((size_t)n, sizeof *lost);
+    uz_error err = {0};
+    CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, whole, r, &err) == UZ_OK);
+    for (int says = 0; says < 2; says++) {
+        uz_blocks half;
+        half_of(&half, &p);
+        const int64_t some = half.nodes / 4, size = (int64_t)half.b * half.b;
+        memset(half.off + half.ptr[some] * size, 0,
+               (size_t)((half.ptr[half.nodes] - half.ptr[some]) * size) * sizeof *half.off);
+        memset(half.diag + some * size, 0, (size_t)((half.nodes - some) * size) * sizeof *half.diag);
+        for (int64_t i = 0; i < some; i++)
+            lost[i] = true;
+        CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, says ? lost : NULL, NULL, &err) == UZ_OK);
+        CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, says ? told : found, r, &err) == UZ_OK);
+        free(half.off);
+        free(half.diag);
+    }
+    CHECK(memcmp(told, found, (size_t)n * sizeof *told) == 0);
+    CHECK(memcmp(told, whole, (size_t)n * sizeof *told) != 0);
+    free(r);
+    free(told);
+    free(whole);
+    free(found);
+    free(lost);
     close_pair(&p);
 }
 
@@ -661,7 +696,9 @@ static void *make_in_team(void *arg)
     uz_multigrid_room *room = mg->kind->room(mg, &bytes);
     CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[0], x->r, &err) == UZ_OK);
     half_of(&half, x->p);
-    CHECK(uz_hold_loss(room, mg, &half, &team, &err) == UZ_OK);
+    CHECK(uz_hold_loss(room, mg, &half, NULL, &team, &err) == UZ_OK);
+    free(half.off);
+    free(half.diag);
     CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[1], x->r, &err) == UZ_OK);
     mg->kind->free_room(room);
     uz_multigrid_free(mg);
