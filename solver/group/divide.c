@@ -1,9 +1,10 @@
 /* divide.c: recursive inertial bisection: points are halved by the plane across the line that is nearest to them all,
  * and the halves likewise (H. Simon, "Partitioning of unstructured problems for parallel processing", Computing Systems
- * in Engineering 2 (1991) 135-148). It takes a sort for each halving. */
+ * in Engineering 2 (1991) 135-148). */
 #include "group/divide.h"
 
 #include "core/alloc.h"
+#include "core/random.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,12 +15,36 @@ typedef struct {
     int32_t point;
 } placed;
 
-static int by_place(const void *a, const void *b)
+static bool is_before(placed a, placed b)
 {
-    const placed *x = a, *y = b;
-    if (x->along != y->along)
-        return x->along < y->along ? -1 : 1;
-    return (x->point > y->point) - (x->point < y->point);
+    return a.along != b.along ? a.along < b.along : a.point < b.point;
+}
+
+/* The first `left` of them to the front, in any order (Hoare, "Algorithm 65: find", Commun. ACM 4 (1961) 321-322). */
+static void select_first(placed *points, int64_t n, int64_t left)
+{
+    uint64_t state = 1;
+    for (int64_t low = 0, high = n - 1; low < high;) {
+        int64_t i = low, j = high;
+        const placed pivot = points[low + (int64_t)(uz_uniform(&state) * (double)(high - low))];
+        while (i <= j) {
+            while (is_before(points[i], pivot))
+                i++;
+            while (is_before(pivot, points[j]))
+                j--;
+            if (i <= j) {
+                const placed other = points[i];
+                points[i++] = points[j];
+                points[j--] = other;
+            }
+        }
+        if (left <= j)
+            high = j;
+        else if (left >= i)
+            low = i;
+        else
+            break;
+    }
 }
 
 enum { POWER_STEPS = 30 };
@@ -44,8 +69,8 @@ static void find_line(double line[3], double M[3][3], int dim)
     }
 }
 
-/* Sorts n points along their line. */
-static void sort_points(placed *points, int64_t n, const double *x, int dim)
+/* Where n points are along their line. */
+static void place_points(placed *points, int64_t n, const double *x, int dim)
 {
     double mean[3] = {0}, M[3][3] = {{0}}, line[3];
     for (int64_t k = 0; k < n; k++)
@@ -62,7 +87,6 @@ static void sort_points(placed *points, int64_t n, const double *x, int dim)
         for (int c = 0; c < dim; c++)
             points[k].along += line[c] * (x[points[k].point * (int64_t)dim + c] - mean[c]);
     }
-    qsort(points, (size_t)n, sizeof *points, by_place);
 }
 
 static void divide(int32_t *part, placed *points, int64_t n, const double *x, int dim, int64_t first, int64_t processes)
@@ -73,7 +97,8 @@ static void divide(int32_t *part, placed *points, int64_t n, const double *x, in
         return;
     }
     const int64_t left = processes / 2, of_left = n * left / processes;
-    sort_points(points, n, x, dim);
+    place_points(points, n, x, dim);
+    select_first(points, n, of_left);
     divide(part, points, of_left, x, dim, first, left);
     divide(part, points + of_left, n - of_left, x, dim, first + left, processes - left);
 }
