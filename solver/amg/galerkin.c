@@ -20,21 +20,6 @@ typedef struct {
     int32_t *column; /* ptr[nodes] */
 } columns;
 
-static void sort(int32_t *list, int64_t count)
-{
-    if (count > 32) {
-        qsort(list, (size_t)count, sizeof *list, uz_ascending_32);
-        return;
-    }
-    for (int64_t s = 1; s < count; s++) {
-        const int32_t value = list[s];
-        int64_t t = s;
-        for (; t > 0 && list[t - 1] > value; t--)
-            list[t] = list[t - 1];
-        list[t] = value;
-    }
-}
-
 static bool grow(int32_t **list, int64_t *room, int64_t need)
 {
     if (need <= *room)
@@ -79,7 +64,7 @@ static bool find_columns(columns *AP, int32_t *seen, const uz_level *level, cons
             count = add_columns(AP->column, count, seen, level, A->idx[e], (int32_t)i);
         for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
             count = add_columns(AP->column, count, seen, level, below->node[e], (int32_t)i);
-        sort(AP->column + from, count - from);
+        uz_sort_32(AP->column + from, count - from);
         AP->ptr[i + 1] = count;
     }
     return ok;
@@ -112,7 +97,7 @@ static bool find_pattern(uz_blocks *coarse, int32_t *seen, const uz_level *level
                     coarse->idx[count++] = AP->column[e];
                 }
         if (ok)
-            sort(coarse->idx + from, count - from);
+            uz_sort_32(coarse->idx + from, count - from);
         coarse->ptr[a + 1] = count;
     }
     free(start);

@@ -23,6 +23,22 @@ static inline int uz_ascending_real(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* A list that is short or nearly in order, as a rule. */
+static inline void uz_sort_32(int32_t *value, int64_t count)
+{
+    if (count > 32) {
+        qsort(value, (size_t)count, sizeof *value, uz_ascending_32);
+        return;
+    }
+    for (int64_t s = 1; s < count; s++) {
+        const int32_t own = value[s];
+        int64_t t = s;
+        for (; t > 0 && value[t - 1] > own; t--)
+            value[t] = value[t - 1];
+        value[t] = own;
+    }
+}
+
 /* Sorts a list and leaves each number once; returns how many there are then. */
 static inline int64_t uz_sort_unique(int64_t *value, int64_t count)
 {

@@ -193,7 +193,7 @@ static void keep_half(uz_spread *map)
                 map->neighbour[kept++] = map->number[other];
         }
         map->offset[i] = first;
-        qsort(map->neighbour + first, (size_t)(kept - first), sizeof *map->neighbour, uz_ascending_32);
+        uz_sort_32(map->neighbour + first, kept - first);
     }
     map->offset[map->nodes] = kept;
 }
