@@ -51,15 +51,18 @@ uz_status uz_amg_rounding(double *rounding, const uz_csc *K, uz_error *err)
     const bool ok = sum && root && count;
     for (int64_t j = 0; ok && j < K->cols; j++)
         root[j] = sqrt(1.0 / K->val[K->ptr[j]]);
-    for (int64_t j = 0; ok && j < K->cols; j++)
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+    for (int64_t j = 0; ok && j < K->cols; j++) {
+        double own = sum[j] + K->val[K->ptr[j]] * root[j] * root[j]; /* the diagonal entry stands first */
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
             const int64_t i = K->idx[k];
             const double scaled = fabs(K->val[k]) * root[i] * root[j];
-            sum[j] += scaled;
-            count[j]++;
-            sum[i] += i != j ? scaled : 0.0;
-            count[i] += i != j;
+            own += scaled;
+            sum[i] += scaled;
+            count[i]++;
         }
+        sum[j] = own;
+        count[j] += K->ptr[j + 1] - K->ptr[j];
+    }
     for (int64_t j = 0; ok && j < K->cols; j++) {
         most = fmax(most, sum[j]);
         longest = count[j] > longest ? count[j] : longest;
