@@ -61,6 +61,7 @@ typedef struct {
     store_status (*upload_total)(store *s, int64_t *bytes);                 /* NULL: nobody sends it any */
     const store_engine_nodes *nodes;                                        /* NULL: a store has one daemon */
     store_status (*collect)(store *s, int64_t *count); /* store_collect_objects; NULL: settings.objects is not used */
+    store_status (*tidy)(store *s);                    /* NULL: it puts nothing off */
     store_status (*try_write)(store *s);
     int64_t (*free_bytes)(store *s);
     store_status (*check)(store *s, store_findings *out);

@@ -147,6 +147,11 @@ store_status store_collect_objects(store *s, int64_t *count)
     return s->engine->collect ? s->engine->collect(s, count) : STORE_OK;
 }
 
+store_status store_tidy(store *s)
+{
+    return s->engine->tidy ? s->engine->tidy(s) : STORE_OK;
+}
+
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated)
 {
     *out = (job){.progress = 0};

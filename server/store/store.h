@@ -272,6 +272,9 @@ store_status store_get_history(store *s, const char *id, int64_t number, int64_t
  * asks, often. */
 store_status store_collect_objects(store *s, int64_t *count);
 
+/* Does what was put off until nobody waits for it. One thread asks, often. */
+store_status store_tidy(store *s);
+
 /* Writes something that changes nothing, all the way to the disk: what a submission would meet now. */
 store_status store_try_write(store *s);
 

@@ -89,6 +89,7 @@ void *housekeeping_loop(void *arg)
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
         store_collect_objects(w->store, &count);
         metrics_add(w->options.metrics, METRIC_OBJECT_GONE, count);
+        store_tidy(w->store);
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

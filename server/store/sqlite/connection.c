@@ -161,10 +161,10 @@ static const char *const SQL[QUERY_COUNT] = {
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */
 static const char *const COMMON_PRAGMAS = "PRAGMA foreign_keys = ON; PRAGMA mmap_size = 0; PRAGMA temp_store = MEMORY;"
                                           "PRAGMA trusted_schema = OFF;";
-/* NORMAL: a commit alone may be lost at power loss, so sync.c syncs the log before anything is acknowledged. The log is
- * moved into the file every 4000 pages: what the many small jobs change is then written there once for many. */
+/* NORMAL: a commit alone may be lost at power loss, so sync.c syncs the log before anything is acknowledged. log.c says
+ * when the log is moved into the file. */
 static const char *const WRITER_PRAGMAS =
-    "PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 4000; PRAGMA journal_size_limit = 16777216;"
+    "PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0; PRAGMA journal_size_limit = 16777216;"
     "PRAGMA secure_delete = FAST;";
 
 bool connection_open(connection *c, const char *path, bool writer, char *message, size_t size)

@@ -8,19 +8,27 @@
 #include "store/engine_base.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 
 #define STORE_READERS 4
 
-/* Lock order: none of these is taken while another is held, except message and sync under writer_lock. */
+/* Lock order: none of these is taken while another is held, except message, move and sync under writer_lock. */
 typedef struct {
     store base;
     pthread_mutex_t writer_lock; /* writer, last_ms, sequence, claims */
-    connection writer;           /* the only one that writes and checkpoints */
+    connection writer;           /* the only one that changes anything */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
     uint64_t claims; /* the token of the last one; begins at the time of opening, past those of earlier processes */
 
     batch changes; /* that wait for the writer; write.c */
+
+    /* The log is moved into the file by mover, while others write, or where it has grown too long by the writer: log.c.
+     */
+    pthread_mutex_t move_lock; /* one of them at a time; mover */
+    connection mover;
+    atomic_int log_pages;    /* of the log when a change was committed last */
+    atomic_bool log_suspect; /* it could not be moved */
 
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;
@@ -78,6 +86,14 @@ void sqlite_take_spare(sqlite_store *s);
 bool sqlite_is_full(int fd);
 /* On a full disk, for a start: leaves a part of the spare room free. */
 void sqlite_lend_spare(sqlite_store *s);
+
+/* ---- log.c */
+bool sqlite_log_begin(sqlite_store *s, char *message, size_t size); /* once the writer has read the file */
+/* All of the log, whoever has to wait for that, on the writer, under its lock: what was written is then in the file,
+ * and on disk. false: it could not be moved. */
+bool sqlite_move_log(sqlite_store *s);
+/* A long log, as far as nobody has to wait for that. */
+store_status sqlite_tidy(store *s);
 
 /* ---- sync.c */
 bool sqlite_sync_begin(sqlite_store *s); /* once the writer has read the file; false: no thread, or no log */

@@ -72,7 +72,7 @@ static bool open_connections(sqlite_store *s, const char *path, char *message, s
         s->readers_free[s->n_readers_free] = &s->readers[i];
         s->n_readers_free += ok;
     }
-    if (!ok)
+    if (!ok || !sqlite_log_begin(s, message, size))
         return false;
     if (asprintf(&folder, "%s-uploads", s->path) < 0)
         folder = NULL;
@@ -101,6 +101,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
     }
     store_base_begin(&s->base, &STORE_SQLITE);
     pthread_mutex_init(&s->writer_lock, NULL);
+    pthread_mutex_init(&s->move_lock, NULL);
     batch_begin(&s->changes, sqlite_run_batch, s);
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
@@ -144,6 +145,7 @@ void sqlite_close(store *base)
     sqlite_sync_end(s);
     for (int i = 0; i < STORE_READERS; i++)
         connection_close(&s->readers[i]);
+    connection_close(&s->mover);
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
     if (s->file >= 0)
         close(s->file);
@@ -155,6 +157,7 @@ void sqlite_close(store *base)
     pthread_cond_destroy(&s->reader_free);
     pthread_mutex_destroy(&s->readers_lock);
     batch_end(&s->changes);
+    pthread_mutex_destroy(&s->move_lock);
     pthread_mutex_destroy(&s->writer_lock);
     if (s->trail.fd >= 0)
         close(s->trail.fd);
@@ -191,6 +194,7 @@ const store_engine STORE_SQLITE = {
     .upload_forget = sqlite_upload_forget,
     .upload_idle = sqlite_upload_idle,
     .upload_total = sqlite_upload_total,
+    .tidy = sqlite_tidy,
     .try_write = sqlite_try_write,
     .free_bytes = sqlite_free_bytes,
     .check = sqlite_check,

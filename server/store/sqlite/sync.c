@@ -28,14 +28,15 @@ static void *sync_loop(void *argument)
         pthread_mutex_unlock(&s->sync_lock);
         double begun = clock_seconds(CLOCK_MONOTONIC);
         /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */
-        suspect = suspect || s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
+        suspect = suspect || atomic_exchange(&s->log_suspect, false) ||
+                  s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
         if (suspect) {
             /* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed
              * without them. A checkpoint writes them once more, elsewhere, and syncs that; until one succeeds a sync's
              * word counts for nothing. */
             connection *c = &s->writer;
             pthread_mutex_lock(&s->writer_lock);
-            suspect = sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL) != SQLITE_OK;
+            suspect = !sqlite_move_log(s);
             if (suspect) {
                 snprintf(c->message, sizeof c->message, "the log could not be synced, nor moved: %s",
                          sqlite3_errmsg(c->db));

@@ -86,7 +86,7 @@ static void run_alone(sqlite_store *s, pending *p)
         if (tries == 2)
             s->spare_there = !(given = ftruncate(s->spare, 0) == 0);
         if (tries > 0)
-            sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+            sqlite_move_log(s);
         s->trail.noted.len = 0;
         p->status = run_query(c, QUERY_BEGIN);
         if (p->status == STORE_OK) {
@@ -99,7 +99,7 @@ static void run_alone(sqlite_store *s, pending *p)
             break;
     }
     if (given)
-        sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+        sqlite_move_log(s);
     sqlite_take_spare(s);
     if (is_failure(p->status) || p->status == STORE_QUOTA)
         store_set_message(&s->base, c->message);

@@ -325,6 +325,34 @@ TEST(a_write_is_tried)
     place_end(&p);
 }
 
+/* ---- who waits for the journal to be moved into the file */
+
+TEST(journal_is_moved_while_nobody_waits)
+{
+    enum { SIZE = 20 << 20 }; /* of a body, some 5000 pages: long, but not too long */
+    place p;
+    char id[33];
+    struct stat st;
+    char *body = calloc(1, SIZE);
+    job j = {0};
+    bool repeated = false;
+    CHECK(body);
+    if (body && place_begin(&p)) {
+        CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = SIZE, .tags = "[]"}, &j, &repeated),
+                  STORE_OK);
+        for (int i = 0; i < 3; i++)
+            CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_INT(stat(p.path, &st), 0);
+        CHECK_MSG(st.st_size < SIZE / 2, "a change has moved %lld bytes", (long long)st.st_size);
+        CHECK_INT(store_tidy(p.s), STORE_OK);
+        CHECK_INT(stat(p.path, &st), 0);
+        CHECK_MSG(st.st_size > SIZE, "the file has %lld bytes", (long long)st.st_size);
+        job_clear(&j);
+        place_end(&p);
+    }
+    free(body);
+}
+
 /* ---- the journal stays small and only the writer's settings are in force */
 
 TEST(journal_is_wal_and_is_cut)

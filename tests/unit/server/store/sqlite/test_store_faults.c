@@ -246,6 +246,55 @@ TEST(power_loss_takes_nothing_that_was_acknowledged)
     CHECK(2 * cuts > scaled(100));
 }
 
+/* The same while a long log is moved into the file, which another connection than the writer's does. */
+TEST(power_loss_takes_nothing_while_the_log_is_moved)
+{
+    enum { SIZE = 17 << 20, EVENTS = 5000 }; /* some 4300 pages, which are written once more, and synced */
+    long cuts = 0;
+    faulty_install();
+    for (long run = 0; run < scaled(16); run++) {
+        place p = {.s = NULL};
+        told t = {.count = 0};
+        char path[96], message[400] = "";
+        uint64_t seed = (uint64_t)run * 104729 + 3;
+        faulty_reset();
+        strcpy(power.folder, "/tmp/test-power-XXXXXX");
+        CHECK(mkdtemp(power.folder));
+        power.seed = seed ^ 0x5555;
+        power.now = &t;
+        power.cut = false;
+        faulty.tracks = true;
+        faulty.on_cut = cut_power;
+        CHECK(place_begin(&p));
+        CHECK_INT(step_submit(p.s, &t, SIZE), STORE_OK);
+        const bool within = run % 2; /* or soon after, where the log begins anew */
+        if (within)
+            faulty.cut_at = faulty.events + 1 + (long)(faulty_random(&seed) % EVENTS);
+        if (run % 4 < 2) { /* a write or a sync fails */
+            faulty.fail_at = faulty.events + 1 + (long)(faulty_random(&seed) % (run % 8 < 4 ? 2 : EVENTS));
+            faulty.fail_code = SQLITE_IOERR_WRITE;
+        }
+        for (int i = 0; i < 3 && !power.cut; i++) {
+            store_tidy(p.s);
+            if (i == 0 && !within)
+                faulty.cut_at = faulty.events + 1 + (long)(faulty_random(&seed) % 60);
+            step_submit(p.s, &t, 300);
+            step_run(p.s, &t);
+        }
+        place_end(&p);
+        faulty_reset();
+        snprintf(path, sizeof path, "%s/jobs.db", power.folder);
+        store *s = power.cut ? store_open(path, message, sizeof message) : NULL;
+        CHECK_MSG(s || !power.cut, "run %ld: %s", run, message);
+        if (s)
+            check_told(s, path, &power.before, "power loss in a move", run);
+        store_close(s);
+        cuts += power.cut;
+        remove_folder(power.folder);
+    }
+    CHECK(2 * cuts > scaled(16));
+}
+
 /* The test itself: a store that acknowledges before the sync would be found out. */
 TEST(the_simulated_disk_forgets_what_is_not_synced)
 {
