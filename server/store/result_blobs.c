@@ -11,7 +11,7 @@
 
 /* ---- writing */
 
-/* rows x columns doubles, whose rows stay together. piece: room for one. */
+/* rows x columns doubles, whose rows stay together. piece: room for one, where bytes are in another order. */
 static store_status put_blob(const result_blobs *place, void *transaction, const result_key *key, const double *x,
                              int64_t rows, int64_t columns, unsigned char *piece)
 {
@@ -19,7 +19,8 @@ static store_status put_blob(const result_blobs *place, void *transaction, const
     store_status status = STORE_OK;
     for (int64_t at = 0, part = 0; status == STORE_OK && (at < count || part == 0); at += most, part++) {
         const int64_t n = count - at < most ? count - at : most;
-        for (int64_t i = 0; i < n; i++) {
+        const bool as_is = htole64(1) == 1;
+        for (int64_t i = 0; i < n && !as_is; i++) {
             uint64_t bits;
             memcpy(&bits, x + at + i, 8);
             bits = htole64(bits);
@@ -30,7 +31,7 @@ static store_status put_blob(const result_blobs *place, void *transaction, const
                                             .encoding = RESULT_ENCODING,
                                             .header = key->name ? count : columns,
                                             .last = n > 0 ? x[at + n - columns] : -1.0,
-                                            .data = piece,
+                                            .data = as_is ? (const void *)(x + at) : piece,
                                             .size = 8 * n});
     }
     return status;
