@@ -190,13 +190,28 @@ static void multiply_slab(void *ctx, int slab)
     }
 }
 
-/* y += K c, of the cells where c is not zero. */
-static void add_sparse(double *y, const uz_brick *brick, const double *c)
+/* Lines of nodes along x where c is not zero. */
+static bool find_lines(bool *some, const uz_brick *brick, const double *c)
 {
-    const int64_t *n = brick->cells, line = n[0] + 1, plane = line * (n[1] + 1);
+    const int64_t *n = brick->cells, numbers = 3 * (n[0] + 1), lines = (n[1] + 1) * (n[2] + 1), *dof = brick->dof;
+    bool any = false;
+    for (int64_t line = 0; line < lines; line++, dof += numbers) {
+        some[line] = false;
+        for (int64_t i = 0; i < numbers && !some[line]; i++)
+            some[line] = dof[i] >= 0 && c[dof[i]] != 0.0;
+        any = any || some[line];
+    }
+    return any;
+}
+
+/* y += K c, of the cells where c is not zero. */
+static void add_sparse(double *y, const uz_brick *brick, const double *c, const bool *some)
+{
+    const int64_t *n = brick->cells, line = n[0] + 1, lines = n[1] + 1, plane = line * lines;
     for (int64_t k = 0; k < n[2]; k++)
-        for (int64_t j = 0; j < n[1]; j++)
-            for (int64_t i = 0; i < n[0]; i++) {
+        for (int64_t j = 0; j < n[1]; j++) {
+            const bool *below = some + k * lines + j, *above = below + lines;
+            for (int64_t i = 0; (below[0] || below[1] || above[0] || above[1]) && i < n[0]; i++) {
                 const int64_t *dof[DOFS];
                 double v[DOFS];
                 bool any = false;
@@ -215,14 +230,15 @@ static void add_sparse(double *y, const uz_brick *brick, const double *c)
                         y[*dof[row]] += sum;
                 }
             }
+        }
 }
 
 uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_brick *brick, const double *x,
                                    const double *c, uz_error *err)
 {
     whole w;
-    const bool ok = make(&w, brick);
-    bool any = false;
+    bool *some = uz_alloc((brick->cells[1] + 1) * (brick->cells[2] + 1), sizeof *some);
+    const bool ok = make(&w, brick) && some;
     w.x = x;
     w.hi = hi;
     w.lo = lo;
@@ -230,9 +246,8 @@ uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_b
         uz_aside_share(multiply_slab, &w, w.slabs);
     clear(&w);
     memset(y, 0, (size_t)brick->d * sizeof *y);
-    for (int64_t j = 0; j < brick->d && !any; j++)
-        any = c[j] != 0.0;
-    if (ok && any)
-        add_sparse(y, brick, c);
+    if (ok && find_lines(some, brick, c))
+        add_sparse(y, brick, c, some);
+    free(some);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a residual of %lld dofs", (long long)brick->d);
 }

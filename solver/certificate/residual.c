@@ -304,27 +304,46 @@ static void multiply_split(void *ctx, int64_t begin, int64_t end)
     multiply(ctx, begin, end, 0);
 }
 
-static inline __attribute__((always_inline)) void finish(const uz_residuals *out, const double *lo, const uz_csc *N,
-                                                         const double *p, const double *r)
+/* Rows as the threads that share them see that. */
+typedef struct {
+    const uz_residuals *out;
+    const double *lo, *p, *r;
+    const uz_csc *N;
+} finishing;
+
+static inline __attribute__((always_inline)) void finish(const finishing *x, int64_t begin, int64_t end)
 {
-    for (int64_t j = 0; j < N->cols;)
-        if (j + 4 <= N->cols && N->ptr[j + 4] == N->ptr[j]) {
-            finish_four(out, j, lo, p);
+    const uz_csc *N = x->N;
+    for (int64_t j = begin; j < end;)
+        if (j + 4 <= end && N->ptr[j + 4] == N->ptr[j]) {
+            finish_four(x->out, j, x->lo, x->p);
             j += 4;
         } else {
-            finish_row(out, j++, lo, N, p, r);
+            finish_row(x->out, j++, x->lo, N, x->p, x->r);
         }
 }
 
-UZ_AVX2_FMA static void finish_wide(const uz_residuals *out, const double *lo, const uz_csc *N, const double *p,
-                                    const double *r)
+UZ_AVX2_FMA static void finish_wide(void *ctx, int64_t begin, int64_t end)
 {
-    finish(out, lo, N, p, r);
+    finish(ctx, begin, end);
 }
 
-static void finish_narrow(const uz_residuals *out, const double *lo, const uz_csc *N, const double *p, const double *r)
+static void finish_narrow(void *ctx, int64_t begin, int64_t end)
 {
-    finish(out, lo, N, p, r);
+    finish(ctx, begin, end);
+}
+
+/* What is in passing where K has its entries. */
+typedef struct {
+    const uz_csc *K;
+    double *weight;
+} weighing;
+
+static void find_weights(void *ctx, int64_t begin, int64_t end)
+{
+    const weighing *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->weight[j] = uz_dof_weight(x->K, j);
 }
 
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
@@ -332,9 +351,6 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
 {
     int64_t d = K->rows;
     double *lo = out->e_u; /* until a row is finished */
-    memset(lo, 0, (size_t)d * sizeof *lo);
-    memset(out->Ku, 0, (size_t)d * sizeof *lo);
-    memset(out->Kc, 0, (size_t)d * sizeof *lo);
     product_of product = {
         .A = K, .x = u, .c = c, .last = d - 1, .hi = out->Ku, .lo = lo, .y = out->Kc, .weight = out->weight};
     while (product.first < d && c[product.first] == 0.0)
@@ -343,13 +359,17 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         product.last--;
     uz_status status = UZ_OK;
     if (out->brick) {
-        for (int64_t j = 0; out->weight && j < d; j++)
-            out->weight[j] = uz_dof_weight(K, j);
+        if (out->weight)
+            uz_by_pieces(find_weights, &(weighing){K, out->weight}, d);
         status = uz_brick_precise_product(out->Ku, lo, out->Kc, out->brick, u, c, err);
     } else {
+        memset(lo, 0, (size_t)d * sizeof *lo);
+        memset(out->Ku, 0, (size_t)d * sizeof *lo);
+        memset(out->Kc, 0, (size_t)d * sizeof *lo);
         uz_by_columns(uz_cpu_has_avx2_fma() ? multiply_fused : multiply_split, &product, K);
     }
-    (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(out, lo, N, p, r);
+    if (status == UZ_OK)
+        uz_by_pieces(uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow, &(finishing){out, lo, p, r, N}, d);
     return status;
 }
 
