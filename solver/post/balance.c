@@ -7,9 +7,11 @@
 
 #include "assembly/parts.h"
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
+#include "linalg/pieces.h"
 #include "post/parts.h"
 
 #include <math.h>
@@ -144,23 +146,44 @@ static void find_wanted(balance *b)
         b->wanted[a] = b->held[a] || uz_mesh_hangs(&b->model->mesh, a) || uz_is_tied(b->model, a);
 }
 
-/* f_int where it is wanted, of the elements that touch such nodes. */
-static void add_elements(balance *b)
+enum { AT_ONCE = 2048, PART = 64 }; /* elements */
+
+/* Elements that touch such nodes, as the threads that share them see them: which they are, and what some of them do to
+ * their nodes. */
+typedef struct {
+    const balance *b;
+    bool *touches; /* n_elements */
+    double *force; /* AT_ONCE x UZ_ELEMENT_DOFS */
+    int count;
+    int64_t element[AT_ONCE];
+} touching;
+
+static void look_for_touching(void *ctx, int64_t begin, int64_t end)
 {
+    const touching *x = ctx;
+    const uz_mesh *mesh = &x->b->model->mesh;
+    for (int64_t e = begin; e < end; e++) {
+        bool touches = false;
+        for (int64_t k = mesh->first[e]; k < mesh->first[e + 1]; k++)
+            touches = touches || x->b->wanted[mesh->node[k]];
+        x->touches[e] = touches;
+    }
+}
+
+static void find_forces(void *ctx, int part)
+{
+    const touching *x = ctx;
+    const balance *b = x->b;
     const uz_body_model *model = b->model;
     const uz_mesh *mesh = &model->mesh;
     const bool alike = mesh->uniform && model->kind != UZ_AXISYMMETRIC;
     const uz_body_material *made = NULL; /* of which ke is */
     uz_element element;
     double xyz[3 * UZ_ELEMENT_NODES], ke[MOST_KE];
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
+    for (int s = part * PART; s < x->count && s < (part + 1) * PART; s++) {
+        const int64_t e = x->element[s];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        bool touches = false;
-        for (int a = 0; a < count; a++)
-            touches = touches || b->wanted[node[a]];
-        if (!touches)
-            continue;
         if (!alike || made != uz_element_material(model, e)) {
             uz_body_element(&element, xyz, model, e);
             uz_element_stiffness(ke, &element);
@@ -169,14 +192,49 @@ static void add_elements(balance *b)
         const int dim = b->dim, n = count * dim;
         for (int i = 0; i < n; i++) {
             double sum = 0;
-            if (!b->wanted[node[i / dim]])
-                continue;
-            for (int j = 0; j < n; j++)
+            for (int j = 0; b->wanted[node[i / dim]] && j < n; j++)
                 sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
-            b->inner[node[i / dim] * dim + i % dim] += sum;
-            b->size += fabs(sum);
+            x->force[(int64_t)s * UZ_ELEMENT_DOFS + i] = sum;
         }
     }
+}
+
+static void add_forces(balance *b, touching *x)
+{
+    uz_aside_share(find_forces, x, (x->count + PART - 1) / PART);
+    for (int s = 0; s < x->count; s++) {
+        int count;
+        const int64_t *node = uz_mesh_element(&b->model->mesh, x->element[s], &count);
+        for (int i = 0; i < count * b->dim; i++) {
+            const double force = x->force[(int64_t)s * UZ_ELEMENT_DOFS + i];
+            if (!b->wanted[node[i / b->dim]])
+                continue;
+            b->inner[node[i / b->dim] * b->dim + i % b->dim] += force;
+            b->size += fabs(force);
+        }
+    }
+    x->count = 0;
+}
+
+/* f_int where it is wanted, of the elements that touch such nodes. */
+static uz_status add_elements(balance *b, uz_error *err)
+{
+    const int64_t n = b->model->mesh.n_elements;
+    touching x = {.b = b,
+                  .touches = uz_alloc(n, sizeof *x.touches),
+                  .force = uz_alloc(AT_ONCE * UZ_ELEMENT_DOFS, sizeof *x.force)};
+    const bool ok = x.touches && x.force;
+    if (ok)
+        uz_by_pieces(look_for_touching, &x, n);
+    for (int64_t e = 0; ok && e < n; e++) {
+        if (x.touches[e])
+            x.element[x.count++] = e;
+        if (x.count == AT_ONCE || e + 1 == n)
+            add_forces(b, &x);
+    }
+    free(x.touches);
+    free(x.force);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld elements", (long long)n);
 }
 
 /* Forces at hanging nodes go to those that they lie amid, in what is left to supports by node. */
@@ -423,13 +481,14 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     for (int64_t a = 0; a < n && status == UZ_OK; a++) {
         const double *f = b.load + a * dim;
         double square = 0;
+        if (f[0] == 0 && f[1] == 0 && (dim == 2 || f[2] == 0))
+            continue;
         for (int64_t c = 0; c < dim; c++) {
             work += f[c] * u[a * dim + c];
             square += f[c] * f[c];
         }
         out->loads_size += sqrt(square);
-        if (f[0] != 0 || f[1] != 0 || (dim == 3 && f[2] != 0))
-            add_force(&b, &out->loads, a, f);
+        add_force(&b, &out->loads, a, f);
     }
     if (status == UZ_OK)
         status = list_supports(&b, err);
@@ -438,7 +497,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     if (status == UZ_OK && known)
         take_inner(&b, known->inner);
     else if (status == UZ_OK)
-        add_elements(&b);
+        status = add_elements(&b, err);
     if (status == UZ_OK) {
         leave_hanging(&b);
         leave_tied(&b);

@@ -30,8 +30,9 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
                                  const double *u, const double *r, uz_error *err);
 
 /* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
- * summary's geometry.sliding and discretization_error. */
-uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+ * summary's geometry.sliding and discretization_error. coarse: of the answer. */
+uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene,
+                         const uz_coarse_contact *coarse, uz_error *err);
 /* Those of them that are about the mesh alone, of an answer of large deformation. */
 void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene *scene);
 /* Of an answer whose mesh is told to be off by more than was known then: coarse_mesh tells as much. */

@@ -1,6 +1,7 @@
 #include "post/evaluate.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "finite/follower.h"
 #include "core/hooks.h"
@@ -131,10 +132,48 @@ static uz_status sum_contact(double *pressed, uz_result *result, const uz_body_m
     return UZ_OK;
 }
 
+/* What an answer is looked at for at its surfaces, which another thread may do. */
+typedef struct {
+    uz_aside_task task;
+    const uz_result *result;
+    const uz_body_model *model;
+    const uz_scene *scene;
+    uz_coarse_contact coarse;
+    uz_status status;
+    uz_error err;
+} surface_work;
+
+static void look_at_surfaces(void *ctx)
+{
+    surface_work *x = ctx;
+    const uz_result *of = x->result;
+    x->status = uz_measure_overlap(of->evaluation->overlap, x->model, x->scene, of->u, &x->err);
+    if (x->status == UZ_OK)
+        x->status = uz_find_coarse_contact(&x->coarse, x->model, x->scene, of->u, of->r, &x->err);
+}
+
+/* What acts on the body, and beside it how deep surfaces stand in each other, and where contact is narrow. */
+static uz_status look_at_answer(uz_coarse_contact *coarse, uz_result *result, const uz_body_model *model,
+                                const uz_scene *scene, uz_error *err)
+{
+    enum { LEAST = 1000 }; /* rows; with fewer it takes less than a thread does to wake up */
+    surface_work x = {.result = result, .model = model, .scene = scene};
+    x.task = (uz_aside_task){.run = look_at_surfaces, .ctx = &x};
+    const bool aside = model->m >= LEAST && uz_aside_start(&x.task);
+    const uz_status status = uz_balance_forces(result->evaluation, model, scene, result->u, result->r, NULL, err);
+    if (!aside || !uz_aside_finish(&x.task))
+        look_at_surfaces(&x);
+    *coarse = x.coarse;
+    if (status == UZ_OK && x.status != UZ_OK)
+        *err = x.err;
+    return status == UZ_OK ? x.status : status;
+}
+
 uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
                       uz_error *err)
 {
     uz_summary *summary = &result->summary;
+    uz_coarse_contact coarse;
     double pressed;
     uz_status status = begin(result, model, scene, err);
     uz_evaluation *e = result->evaluation;
@@ -143,9 +182,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status == UZ_OK)
         status = sum_contact(&pressed, result, model, NULL, err);
     if (status == UZ_OK)
-        status = uz_balance_forces(e, model, scene, result->u, result->r, NULL, err);
-    if (status == UZ_OK)
-        status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
+        status = look_at_answer(&coarse, result, model, scene, err);
     if (status != UZ_OK)
         return status;
     if (!uz_ahead_take(ahead, &summary->discretization_error, &summary->stress_share, result->u))
@@ -156,7 +193,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
     if (status == UZ_OK)
         status = uz_find_peak_stress(e, model, scene, result->u, err);
-    return status == UZ_OK ? uz_find_doubts(result, model, scene, err) : status;
+    return status == UZ_OK ? uz_find_doubts(result, model, scene, &coarse, err) : status;
 }
 
 /* ---- finite kinematics */

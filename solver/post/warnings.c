@@ -373,7 +373,7 @@ static void look_at_surfaces(const doubts *d)
     }
 }
 
-static uz_status look_at_contact(const doubts *d, uz_error *err)
+static uz_status look_at_contact(const doubts *d, const uz_coarse_contact *coarse, uz_error *err)
 {
     int64_t behind = -1, node = 0;
     double away = 0;
@@ -392,20 +392,17 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
         }
         uz_obstacle_free(obstacle);
     }
-    uz_coarse_contact coarse = {.contact = -1};
-    if (status == UZ_OK)
-        status = uz_find_coarse_contact(&coarse, d->model, d->scene, d->u, d->r, err);
-    if (coarse.contact >= 0 && coarse.depth > 0)
-        warn(d->out, UZ_WARN_COARSE, (double)coarse.sides,
+    if (coarse->contact >= 0 && coarse->depth > 0)
+        warn(d->out, UZ_WARN_COARSE, (double)coarse->sides,
              "the obstacle of contact %lld stands %.3g deep in %lld sides between their nodes, as at node %lld, and "
              "meets no resistance there; use finer sides, or rows inside them",
-             (long long)coarse.contact, coarse.depth, (long long)coarse.sides, (long long)coarse.node);
-    else if (coarse.contact >= 0)
+             (long long)coarse->contact, coarse->depth, (long long)coarse->sides, (long long)coarse->node);
+    else if (coarse->contact >= 0)
         warn(
-            d->out, UZ_WARN_COARSE, (double)coarse.sides,
+            d->out, UZ_WARN_COARSE, (double)coarse->sides,
             "%.0f %% of the force of contact %lld are carried where it is narrower than three sides (%lld sides touch, "
             "as at node %lld): force and pressure there depend on the mesh; refine it there",
-            100 * coarse.part, (long long)coarse.contact, (long long)coarse.sides, (long long)coarse.node);
+            100 * coarse->part, (long long)coarse->contact, (long long)coarse->sides, (long long)coarse->node);
     if (behind >= 0)
         warn(d->out, "obstacle_behind", away,
              "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "
@@ -665,7 +662,8 @@ void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_sc
         look_at_overlap(&d, k);
 }
 
-uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene,
+                         const uz_coarse_contact *coarse, uz_error *err)
 {
     const uz_summary *s = &result->summary;
     const doubts d = {
@@ -692,7 +690,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     look_at_stabilizer(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
-    status = look_at_contact(&d, err);
+    status = look_at_contact(&d, coarse, err);
     for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         const uz_overlap *o = &d.out->overlap[k];
         const double approach = d.out->approach, scale = fmax(approach, o->depth);
