@@ -253,18 +253,32 @@ static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
     return ok;
 }
 
-/* S: the diagonal becomes 1/2 to 4. */
+/* S: the diagonal becomes 1/2 to 4; 0 where it is not positive. */
+typedef struct {
+    double *scale;
+    const uz_csc *K;
+} scaling;
+
+static void find_scales(void *ctx, int64_t begin, int64_t end)
+{
+    const scaling *x = ctx;
+    const uz_csc *K = x->K;
+    for (int64_t j = begin; j < end; j++) {
+        const int64_t q = K->ptr[j];
+        const bool positive = q < K->ptr[j + 1] && K->idx[q] == j && K->val[q] > 0.0;
+        x->scale[j] = positive ? ldexp(1.0, -ilogb(K->val[q]) / 2) : 0.0;
+    }
+}
+
 static uz_status find_scale(uz_aggregates *mg, const uz_csc *K, uz_error *err)
 {
-    for (int64_t j = 0; j < K->cols; j++) {
-        const int64_t q = K->ptr[j];
-        if (!(q < K->ptr[j + 1] && K->idx[q] == j && K->val[q] > 0.0))
+    uz_by_pieces(find_scales, &(scaling){mg->scale, K}, K->cols);
+    for (int64_t j = 0; j < K->cols; j++)
+        if (mg->scale[j] == 0.0)
             return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                            "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
                            "positive. Support the body so that it can't move freely, or check the signs of K.",
                            (long long)j);
-        mg->scale[j] = ldexp(1.0, -ilogb(K->val[q]) / 2);
-    }
     return UZ_OK;
 }
 
@@ -539,23 +553,41 @@ UZ_AVX2_FMA static void find_rests_wide(int32_t *rest, const double *whole, cons
     find_rests(rest, whole, single, count, per_unit);
 }
 
-/* In their own place, from the front: a rest is half as long. Rows are read as four of them. */
+static void find_rests_narrow(int32_t *rest, const double *whole, const float *single, int64_t count, double per_unit)
+{
+    find_rests(rest, whole, single, count, per_unit);
+}
+
+/* Numbers as the threads that share them see that: `first` is that of the first piece. */
+typedef struct {
+    double *whole;
+    const float *single;
+    double per_unit;
+    int64_t first;
+} leaving;
+
+static void leave_some(void *ctx, int64_t begin, int64_t end)
+{
+    const leaving *x = ctx;
+    const bool wide = uz_cpu_has_avx2_fma();
+    int32_t rest[AT_ONCE] = {0};
+    for (int64_t e = x->first + begin; e < x->first + end; e += AT_ONCE) {
+        const int64_t left = x->first + end - e, some = left < AT_ONCE ? left : AT_ONCE;
+        (wide ? find_rests_wide : find_rests_narrow)(rest, x->whole + e, x->single + e, some, x->per_unit);
+        memcpy((char *)x->whole + e * (int64_t)sizeof *rest, rest, (size_t)some * sizeof *rest);
+    }
+}
+
+/* In their own place: a rest is half as long, so that those of as many numbers as came before take what these have
+ * left. Rows are read as four of them. */
 static uz_rests leave_rests(double **whole, const float *single, int64_t count)
 {
     const double most = uz_long_max(count, *whole),
                  unit = ldexp(1.0, (most > 0.0 ? ilogb(most) : 0) - FLT_MANT_DIG - 31);
-    const bool wide = uz_cpu_has_avx2_fma();
-    int32_t rest[AT_ONCE];
-    char *to = (char *)*whole;
-    for (int64_t e = 0; e < count; e += AT_ONCE) {
-        const int64_t some = count - e < AT_ONCE ? count - e : AT_ONCE;
-        if (wide)
-            find_rests_wide(rest, *whole + e, single + e, some, 1.0 / unit);
-        else
-            find_rests(rest, *whole + e, single + e, some, 1.0 / unit);
-        memcpy(to + e * (int64_t)sizeof *rest, rest, (size_t)some * sizeof *rest);
-    }
-    memset(to + count * (int64_t)sizeof *rest, 0, 4 * sizeof *rest);
+    leaving x = {.whole = *whole, .single = single, .per_unit = 1.0 / unit};
+    for (int64_t end = AT_ONCE; x.first < count; x.first = end, end *= 2)
+        uz_by_pieces(leave_some, &x, (end < count ? end : count) - x.first);
+    memset((char *)*whole + count * (int64_t)sizeof(int32_t), 0, 4 * sizeof(int32_t));
     int32_t *rests = uz_realloc(*whole, count + 4, sizeof *rests);
     rests = rests ? rests : (int32_t *)(void *)*whole;
     *whole = NULL;

@@ -41,32 +41,88 @@ static int64_t add_columns(int32_t *list, int64_t count, int32_t *seen, const uz
     return count;
 }
 
-static bool find_columns(columns *AP, int32_t *seen, const uz_level *level, const uz_below *below)
+/* Rows of A P as the threads that share them see that: each part has its own list until all are known. */
+typedef struct {
+    columns *AP; /* ptr: ends within the part's list, then in all */
+    const uz_level *level;
+    const uz_below *below;
+    int parts;
+    int32_t *seen[UZ_ASIDE_MOST], *list[UZ_ASIDE_MOST]; /* seen: aggregates; NULL: no memory for the list */
+} finding;
+
+static int64_t first_node(const finding *x, int part)
 {
+    return x->level->A.nodes * part / x->parts;
+}
+
+static void find_part(void *ctx, int part)
+{
+    finding *x = ctx;
+    const uz_level *level = x->level;
+    const uz_below *below = x->below;
     const uz_blocks *A = &level->A;
+    const int64_t first = first_node(x, part), end = first_node(x, part + 1);
+    int32_t *seen = x->seen[part], *list = NULL;
     int64_t room = 0, count = 0;
-    AP->ptr = uz_alloc_zero(A->nodes + 1, sizeof *AP->ptr);
-    bool ok = AP->ptr && grow(&AP->column, &room, 8 * A->nodes);
+    bool ok = grow(&list, &room, 8 * (end - first) + 1); /* a process may have no nodes */
     for (int64_t c = 0; c < level->aggregates; c++)
         seen[c] = -1;
-    for (int64_t i = 0; ok && i < A->nodes; i++) {
+    for (int64_t i = first; ok && i < end; i++) {
         int64_t most = level->ptr[i + 1] - level->ptr[i];
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
             most += level->ptr[A->idx[e] + 1] - level->ptr[A->idx[e]];
         for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
             most += level->ptr[below->node[e] + 1] - level->ptr[below->node[e]];
-        ok = grow(&AP->column, &room, count + (most < level->aggregates ? most : level->aggregates));
+        ok = grow(&list, &room, count + (most < level->aggregates ? most : level->aggregates));
         if (!ok)
             break;
         const int64_t from = count;
-        count = add_columns(AP->column, count, seen, level, i, (int32_t)i);
+        count = add_columns(list, count, seen, level, i, (int32_t)i);
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-            count = add_columns(AP->column, count, seen, level, A->idx[e], (int32_t)i);
+            count = add_columns(list, count, seen, level, A->idx[e], (int32_t)i);
         for (int64_t e = below->ptr[i]; e < below->ptr[i + 1]; e++)
-            count = add_columns(AP->column, count, seen, level, below->node[e], (int32_t)i);
-        uz_sort_32(AP->column + from, count - from);
-        AP->ptr[i + 1] = count;
+            count = add_columns(list, count, seen, level, below->node[e], (int32_t)i);
+        uz_sort_32(list + from, count - from);
+        x->AP->ptr[i + 1] = count;
     }
+    if (!ok)
+        free(list);
+    x->list[part] = ok ? list : NULL;
+}
+
+/* Puts the lists of all parts behind the first one's. */
+static bool join(finding *x)
+{
+    columns *AP = x->AP;
+    const int64_t own = AP->ptr[first_node(x, 1)];
+    int64_t all = own;
+    for (int part = 1; part < x->parts; part++) {
+        const int64_t before = all;
+        all += AP->ptr[first_node(x, part + 1)];
+        for (int64_t i = first_node(x, part); i < first_node(x, part + 1); i++)
+            AP->ptr[i + 1] += before;
+    }
+    AP->column = x->parts > 1 ? uz_realloc(x->list[0], all, sizeof *AP->column) : x->list[0];
+    if (!AP->column)
+        return false;
+    x->list[0] = NULL;
+    for (int part = 1; part < x->parts; part++) {
+        const int64_t first = AP->ptr[first_node(x, part)], end = AP->ptr[first_node(x, part + 1)];
+        memcpy(AP->column + first, x->list[part], (size_t)(end - first) * sizeof *AP->column);
+    }
+    return true;
+}
+
+static bool find_columns(columns *AP, finding *x)
+{
+    bool ok = (AP->ptr = uz_alloc_zero(x->level->A.nodes + 1, sizeof *AP->ptr)) != NULL;
+    if (ok)
+        uz_aside_share(find_part, x, x->parts);
+    for (int part = 0; part < x->parts; part++)
+        ok = ok && x->list[part];
+    ok = ok && join(x);
+    for (int part = 0; part < x->parts; part++)
+        free(x->list[part]);
     return ok;
 }
 
@@ -304,7 +360,10 @@ uz_status uz_galerkin(uz_blocks *coarse, const uz_level *level, const uz_below *
         ok = (n.of[part].place = uz_alloc(aggregates, sizeof(int32_t))) && ok;
     }
     int32_t *seen = n.of[0].place;
-    ok = ok && find_columns(&AP, seen, level, below) && find_pattern(coarse, seen, level, &AP);
+    finding rows = {.AP = &AP, .level = level, .below = below, .parts = n.parts};
+    for (int part = 0; part < n.parts; part++)
+        rows.seen[part] = n.of[part].place;
+    ok = ok && find_columns(&AP, &rows) && find_pattern(coarse, seen, level, &AP);
     if (ok) {
         int64_t longest = 1;
         for (int64_t i = 0; i < nodes; i++)
