@@ -16,6 +16,7 @@ typedef struct {
     int axis;
     double low, thickness;
     int64_t slabs;
+    int64_t *slab;  /* n_nodes: where each is */
     int64_t *above; /* n_nodes: another node of the same piece, its own number where it is the piece's first */
     int64_t *count; /* n_nodes: nodes of the piece, by its first one */
 } slicing;
@@ -23,12 +24,6 @@ typedef struct {
 static double place(const slicing *x, int64_t node)
 {
     return x->mesh->xyz[node * x->mesh->dim + x->axis];
-}
-
-static int64_t slab_of(const slicing *x, int64_t node)
-{
-    const int64_t slab = (int64_t)((place(x, node) - x->low) / x->thickness);
-    return slab < x->slabs ? slab : x->slabs - 1;
 }
 
 /* The longest side of the bounding box. */
@@ -39,8 +34,9 @@ static double choose_axis(slicing *x)
     for (int c = 0; c < mesh->dim; c++) {
         double low = INFINITY, high = -INFINITY;
         for (int64_t i = 0; i < mesh->n_nodes; i++) {
-            low = fmin(low, mesh->xyz[i * mesh->dim + c]);
-            high = fmax(high, mesh->xyz[i * mesh->dim + c]);
+            const double at = mesh->xyz[i * mesh->dim + c];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
         }
         if (high - low > longest) {
             longest = high - low;
@@ -60,8 +56,9 @@ static double layer_distance(const slicing *x)
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         double low = INFINITY, high = -INFINITY;
         for (int64_t q = mesh->first[e]; q < mesh->first[e + 1]; q++) {
-            low = fmin(low, place(x, mesh->node[q]));
-            high = fmax(high, place(x, mesh->node[q]));
+            const double at = place(x, mesh->node[q]);
+            low = at < low ? at : low;
+            high = at > high ? at : high;
         }
         sum += (high - low) / (type->nodes > type->corners ? 2 : 1);
     }
@@ -80,13 +77,15 @@ static void unite(slicing *x)
 {
     const uz_mesh *mesh = x->mesh;
     for (int64_t i = 0; i < mesh->n_nodes; i++) {
+        const int64_t slab = (int64_t)((place(x, i) - x->low) / x->thickness);
+        x->slab[i] = slab < x->slabs ? slab : x->slabs - 1;
         x->above[i] = i;
         x->count[i] = 1;
     }
     for (int64_t e = 0; e < mesh->n_elements; e++)
         for (int64_t q = mesh->first[e] + 1; q < mesh->first[e + 1]; q++)
             for (int64_t s = mesh->first[e]; s < q; s++) {
-                if (slab_of(x, mesh->node[s]) != slab_of(x, mesh->node[q]))
+                if (x->slab[mesh->node[s]] != x->slab[mesh->node[q]])
                     continue;
                 const int64_t a = first_of(x, mesh->node[s]), b = first_of(x, mesh->node[q]);
                 if (a != b) {
@@ -102,7 +101,7 @@ static double sum_largest(const slicing *x, int64_t *largest)
 {
     double sum = 0.0;
     for (int64_t i = 0; i < x->mesh->n_nodes; i++) {
-        const int64_t slab = slab_of(x, i);
+        const int64_t slab = x->slab[i];
         if (x->above[i] == i && x->count[i] > largest[slab])
             largest[slab] = x->count[i];
     }
@@ -123,13 +122,15 @@ double uz_mesh_breadth(const uz_mesh *mesh)
     if (!(slabs < (double)mesh->n_nodes)) /* also where there is no thickness */
         return 0.0;
     x.slabs = slabs > 1.0 ? (int64_t)ceil(slabs) : 1;
+    x.slab = uz_alloc(mesh->n_nodes, sizeof *x.slab);
     x.above = uz_alloc(mesh->n_nodes, sizeof *x.above);
     x.count = uz_alloc(mesh->n_nodes, sizeof *x.count);
     int64_t *largest = uz_alloc_zero(x.slabs, sizeof *largest);
-    if (x.above && x.count && largest) {
+    if (x.slab && x.above && x.count && largest) {
         unite(&x);
         breadth = sum_largest(&x, largest) / (LAYERS * fmax(1.0, slabs));
     }
+    free(x.slab);
     free(x.above);
     free(x.count);
     free(largest);
