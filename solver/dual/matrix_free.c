@@ -328,7 +328,7 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
 {
     const uz_amg_info *known = &x->sparse.load.dual->amg->info;
     const int64_t n = x->cg.n;
-    double *w = x->right, largest = 0.0;
+    double *w = x->right;
     uz_cg_stop stop = {.relative = SHARP * sqrt(known->lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = x->stop.hooks,
@@ -337,8 +337,7 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
     uz_cg_info info;
     *value = INFINITY;
     memset(w, 0, (size_t)n * sizeof *w);
-    for (int64_t j = 0; j < n; j++)
-        largest = fmax(largest, fabs(e[j]));
+    const double largest = uz_long_max(n, e);
     /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
     const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
     for (int64_t j = 0; j < n; j++)
@@ -447,15 +446,29 @@ static double goal_of(const free_load *x, double tolerance, double square)
            sqrt(x->sparse.load.dual->amg->info.lambda);
 }
 
-/* What is missing of equilibrium in cg->r is what is left over in force. */
+/* A long vector that another one goes to, taken off, as it is, or turned round: what is missing of equilibrium in cg->r
+ * is what is left over in force. */
 typedef struct {
     double *to;
     const double *from;
-} opposite;
+} moving;
+
+static void subtract(void *ctx, int64_t begin, int64_t end)
+{
+    const moving *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->to[j] -= x->from[j];
+}
+
+static void copy(void *ctx, int64_t begin, int64_t end)
+{
+    const moving *x = ctx;
+    memcpy(x->to + begin, x->from + begin, (size_t)(end - begin) * sizeof *x->to);
+}
 
 static void negate(void *ctx, int64_t begin, int64_t end)
 {
-    const opposite *x = ctx;
+    const moving *x = ctx;
     for (int64_t j = begin; j < end; j++)
         x->to[j] = -x->from[j];
 }
@@ -467,7 +480,7 @@ static double look(void *ctx)
     free_load *x = s->x;
     uz_bounded *box = x->sparse.box;
     box->largest = uz_long_max(x->cg.n, box->u);
-    uz_by_pieces(negate, &(opposite){box->force, x->cg.r}, x->cg.n);
+    uz_by_pieces(negate, &(moving){box->force, x->cg.r}, x->cg.n);
     if (!looks_right(s))
         return INFINITY;
     return goal_of(x, s->least, uz_long_dot(x->cg.n, box->u, box->force) + uz_long_dot(x->cg.n, box->u, box->p));
@@ -489,8 +502,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     uz_sparse_multiply(load, box->force, box->u);
     double square = uz_long_dot(d, box->u, box->force); /* u'K u */
-    for (int64_t j = 0; j < d; j++)
-        box->force[j] -= x->sparse.p[j];
+    uz_by_pieces(subtract, &(moving){box->force, x->sparse.p}, d);
     for (bool go_on = true; status == UZ_OK && go_on;) {
         const double goal = goal_of(x, tolerance, square);
         /* from 0 the first residual has the size of the solution */
@@ -509,7 +521,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
             stop.unchecked = least >= NO_DRIFT;
         }
         stop.begun = true;
-        uz_by_pieces(negate, &(opposite){cg->r, box->force}, d);
+        uz_by_pieces(negate, &(moving){cg->r, box->force}, d);
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
@@ -528,7 +540,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     if (status != UZ_OK)
         return status;
     /* the forces on free dofs, and on held ones what no row bears */
-    memcpy(e, box->force, (size_t)d * sizeof *e);
+    uz_by_pieces(copy, &(moving){e, box->force}, d);
     for (int64_t i = 0; i < m; i++)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     status = measure_slack(x, e, box->r, err);

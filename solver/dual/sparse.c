@@ -10,6 +10,34 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* dual->touched. */
+static bool leave_out_zeros(uz_dual *dual)
+{
+    uz_csc *out = &((uz_sparse *)dual)->touched;
+    const uz_csc *N = &dual->N;
+    *out = (uz_csc){.rows = N->rows, .idx = N->idx, .val = N->val};
+    for (int64_t j = 0; j < N->cols; j++)
+        out->cols += N->ptr[j + 1] > N->ptr[j];
+    out->ptr = uz_alloc(out->cols + 1, sizeof *out->ptr);
+    if (!out->ptr)
+        return false;
+    int64_t at = 0;
+    out->ptr[0] = 0;
+    for (int64_t j = 0; j < N->cols; j++)
+        if (N->ptr[j + 1] > N->ptr[j])
+            out->ptr[++at] = N->ptr[j + 1];
+    dual->touched = out;
+    dual->bytes += 8 * (size_t)(out->cols + 1);
+    return true;
+}
+
+static void clear_bounds(uz_bounds *bounds)
+{
+    free(bounds->dof);
+    free(bounds->scale);
+    memset(bounds, 0, sizeof *bounds);
+}
+
 uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     (void)stop;
@@ -19,7 +47,7 @@ uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
     bool single = true; /* nonzero entry in each row */
     bounds->dof = uz_alloc(m, sizeof *bounds->dof);
     bounds->scale = uz_alloc(m, sizeof *bounds->scale);
-    if (!bounds->dof || !bounds->scale)
+    if (!leave_out_zeros(dual) || !bounds->dof || !bounds->scale)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
     for (int64_t i = 0; single && i < m; i++) {
         bounds->scale[i] = 0.0;
@@ -33,7 +61,7 @@ uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
         single = single && bounds->scale[i] != 0.0;
     }
     if (!single)
-        uz_sparse_clear(dual);
+        clear_bounds(bounds);
     else
         dual->bytes += 16 * (size_t)m;
     dual->rows_may_depend = dual->can->exact && !bounds->dof;
@@ -42,10 +70,10 @@ uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 
 void uz_sparse_clear(uz_dual *dual)
 {
-    uz_bounds *bounds = &((uz_sparse *)dual)->bounds;
-    free(bounds->dof);
-    free(bounds->scale);
-    memset(bounds, 0, sizeof *bounds);
+    uz_sparse *own = (uz_sparse *)dual;
+    clear_bounds(&own->bounds);
+    free(own->touched.ptr);
+    own->touched.ptr = NULL;
 }
 
 uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err)

@@ -34,6 +34,7 @@ typedef struct {
 
 typedef struct {
     uz_dual dual;
+    uz_csc touched; /* N without columns of zeros: its entries */
     uz_bounds bounds;
 } uz_sparse;
 

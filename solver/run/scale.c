@@ -3,9 +3,9 @@
  * u and r are homogeneous of degree 1 in (p, h), and so is every bound; energies are of degree 2. Powers of two are
  * exact, so what is solved is the same problem bit for bit, and answers differ by the power alone. Loads of usual sizes
  * are left as they are. */
-#include "certificate/bound.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 #include "run/run.h"
 
 #include <float.h>
@@ -47,7 +47,7 @@ static void multiply(double *x, int64_t n, int exponent)
 uz_status uz_run_scale_load(uz_run *run, uz_error *err)
 {
     uz_load_vectors *load = &run->load;
-    const double force = uz_bound_largest(run->load.p, run->d);
+    const double force = uz_long_max(run->d, run->load.p);
     double depth = 0.0;
     for (int64_t i = 0; i < run->all; i++)
         depth = fmax(depth, -run->load.h_all[i]);
