@@ -2,6 +2,7 @@
 #include "brick/private.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -72,8 +73,39 @@ bool uz_brick_init(uz_brick *brick)
 
 /* -------------------------------------------------------------- the diagonal */
 
+/* Planes of nodes as the threads that share them see that. */
+typedef struct {
+    uz_csc *to;
+    const uz_brick *brick;
+    int parts;
+} diagonal;
+
+static void add_diagonals(void *ctx, int part)
+{
+    const diagonal *x = ctx;
+    const uz_brick *brick = x->brick;
+    const int64_t *n = brick->cells, planes = n[2] + 1, first = planes * part / x->parts,
+                  end = planes * (part + 1) / x->parts;
+    int64_t node = first * (n[0] + 1) * (n[1] + 1);
+    for (int64_t k = first; k < end; k++)
+        for (int64_t j = 0; j <= n[1]; j++)
+            for (int64_t i = 0; i <= n[0]; i++, node++)
+                for (int a = 0; a < UZ_BRICK_NODES; a++) { /* the cell whose corner a is this node */
+                    const int *corner = uz_brick_corner[a];
+                    const int64_t at[3] = {i - corner[0], j - corner[1], k - corner[2]};
+                    if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= n[0] || at[1] >= n[1] || at[2] >= n[2])
+                        continue;
+                    for (int c = 0; c < 3; c++) {
+                        const int64_t dof = brick->dof[3 * node + c];
+                        if (dof >= 0)
+                            x->to->val[dof] += brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
+                    }
+                }
+}
+
 uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
 {
+    enum { PARTS_MOST = 64 };
     const uz_status status = uz_csc_init(out, brick->d, brick->d, brick->d, err);
     if (status != UZ_OK)
         return status;
@@ -81,21 +113,8 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
         out->ptr[j + 1] = j + 1;
         out->idx[j] = (int32_t)j;
     }
-    int64_t node = 0;
-    for (int64_t k = 0; k <= brick->cells[2]; k++)
-        for (int64_t j = 0; j <= brick->cells[1]; j++)
-            for (int64_t i = 0; i <= brick->cells[0]; i++, node++)
-                for (int a = 0; a < UZ_BRICK_NODES; a++) { /* the cell whose corner a is this node */
-                    const int *corner = uz_brick_corner[a];
-                    const int64_t x = i - corner[0], y = j - corner[1], z = k - corner[2];
-                    if (x < 0 || y < 0 || z < 0 || x >= brick->cells[0] || y >= brick->cells[1] || z >= brick->cells[2])
-                        continue;
-                    for (int c = 0; c < 3; c++) {
-                        const int64_t dof = brick->dof[3 * node + c];
-                        if (dof >= 0)
-                            out->val[dof] += brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
-                    }
-                }
+    diagonal x = {out, brick, brick->cells[2] < PARTS_MOST ? (int)brick->cells[2] + 1 : PARTS_MOST};
+    uz_aside_share(add_diagonals, &x, x.parts);
     return UZ_OK;
 }
 

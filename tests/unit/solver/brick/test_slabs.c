@@ -1,5 +1,5 @@
-/* What threads compute of a box in slabs is what one computes, to the last bit: the products, a cycle, a start on
- * coarser grids, conjugate gradients, and what a certificate has of it. */
+/* What threads compute of a box in slabs is what one computes, to the last bit: its diagonal, the products, a cycle, a
+ * start on coarser grids, conjugate gradients, and what a certificate has of it. */
 #include "brick/brick.h"
 #include "certificate/brick_product.h"
 #include "core/aside.h"
@@ -11,30 +11,45 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { THREADS = 3 };
+
+static uz_body_model make_cells(uz_scene *scene)
+{
+    uz_body_model cells;
+    uz_error err = {0};
+    *scene = box_scene(60, 20, 41, 30);
+    scene->model = UZ_SOLID;
+    scene->box.dim = 3;
+    scene->box.size[2] = 30;
+    scene->box.cells[2] = 37;
+    snprintf(scene->box.element, sizeof scene->box.element, "hex8");
+    add_support(scene, "left", 0, 0);
+    scene->supports[0].u[2] = 0;
+    CHECK_INT(uz_body_model_build(&cells, scene, UZ_BODY_CELLS, &err), UZ_OK);
+    CHECK(cells.brick != NULL);
+    return cells;
+}
+
+static double number(int64_t j)
+{
+    return (double)(j * 7919 % 1000 - 500);
+}
+
 TEST(threads_give_the_same_bits)
 {
-    enum { VECTORS = 6, THREADS = 3 };
-    uz_scene scene = box_scene(60, 20, 41, 30);
-    scene.model = UZ_SOLID;
-    scene.box.dim = 3;
-    scene.box.size[2] = 30;
-    scene.box.cells[2] = 37;
-    snprintf(scene.box.element, sizeof scene.box.element, "hex8");
-    add_support(&scene, "left", 0, 0);
-    scene.supports[0].u[2] = 0;
-    uz_body_model cells;
+    enum { VECTORS = 6 };
+    uz_scene scene;
+    uz_body_model cells = make_cells(&scene);
     const uz_stop never = {.hooks = NULL, .deadline = INFINITY};
     uz_error err = {0};
     uz_csc K = {0};
-    CHECK_INT(uz_body_model_build(&cells, &scene, UZ_BODY_CELLS, &err), UZ_OK);
-    CHECK(cells.brick != NULL);
     const int64_t d = cells.d;
     double *x = calloc((size_t)d, sizeof(double)), *one[VECTORS] = {0}, *many[VECTORS] = {0},
            *bottom = calloc((size_t)d, sizeof(double)), *top = calloc((size_t)d, sizeof(double));
     bool *held = calloc((size_t)d, sizeof *held);
     CHECK(x && bottom && top && held);
     for (int64_t j = 0; j < d; j++) {
-        x[j] = (double)(j * 7919 % 1000 - 500);
+        x[j] = number(j);
         bottom[j] = -INFINITY;
         top[j] = j % 7 == 0 ? 1e-3 : INFINITY;
     }
@@ -56,6 +71,10 @@ TEST(threads_give_the_same_bits)
             memset(y[k], 0, (size_t)d * sizeof *y[k]);
         uz_aside_allow(threads);
         (void)uz_aside_used();
+        uz_csc diagonal;
+        CHECK_INT(uz_brick_diagonal(&diagonal, cells.brick, &err), UZ_OK);
+        CHECK(memcmp(diagonal.val, K.val, (size_t)d * sizeof(double)) == 0);
+        uz_csc_clear(&diagonal);
         CHECK_INT(uz_brick_multigrid(&mg, cells.brick, 0, &err), UZ_OK);
         CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
         mg->kind->multiply(mg, &K, cg.room, y[0], x);
@@ -82,6 +101,83 @@ TEST(threads_give_the_same_bits)
     free(top);
     free(held);
     uz_csc_clear(&K);
+    uz_body_model_clear(&cells);
+    uz_scene_clear(&scene);
+}
+
+/* A start on coarser grids finds limits on some dofs where it finds them among those of all, in every part of the
+ * planes. */
+TEST(limits_on_some_dofs_are_found)
+{
+    uz_scene scene;
+    uz_body_model cells = make_cells(&scene);
+    const uz_stop never = {.hooks = NULL, .deadline = INFINITY};
+    const int64_t d = cells.d;
+    double *x = calloc((size_t)d, sizeof(double)), *bottom = calloc((size_t)d, sizeof(double)),
+           *top = calloc((size_t)d, sizeof(double)), *some = calloc((size_t)d, sizeof(double)),
+           *u[2] = {calloc((size_t)d, sizeof(double)), calloc((size_t)d, sizeof(double))};
+    int64_t *dof = calloc((size_t)d, sizeof *dof), low = 0, high = 0; /* that touch, in either half */
+    bool *held = calloc((size_t)d, sizeof *held), found;
+    const uz_limits all = {.n = d, .bottom = bottom, .top = top};
+    uz_limits listed = {.dof = dof, .bottom = bottom, .top = some};
+    uz_multigrid *mg;
+    uz_cg cg;
+    uz_error err = {0};
+    CHECK(x && bottom && top && some && u[0] && u[1] && dof && held);
+    for (int64_t j = 0; j < d; j++) {
+        x[j] = number(j);
+        bottom[j] = -INFINITY;
+        top[j] = j % 7 == 0 ? 1e-3 : INFINITY;
+        if (j % 7 == 0) {
+            some[listed.n] = top[j];
+            dof[listed.n++] = j;
+        }
+    }
+    CHECK_INT(uz_aside_begin(THREADS), THREADS);
+    uz_aside_allow(THREADS);
+    CHECK_INT(uz_brick_multigrid(&mg, cells.brick, 0, &err), UZ_OK);
+    CHECK_INT(uz_cg_init(&cg, mg, &err), UZ_OK);
+    CHECK_INT(mg->kind->start(mg, cg.room, &found, u[0], held, x, &all, &never, &err), UZ_OK);
+    CHECK(found);
+    CHECK_INT(mg->kind->start(mg, cg.room, &found, u[1], held, x, &listed, &never, &err), UZ_OK);
+    CHECK(found && memcmp(u[0], u[1], (size_t)d * sizeof(double)) == 0);
+    for (int64_t b = 0; b < listed.n; b++) {
+        *(b < listed.n / 2 ? &low : &high) += held[b];
+        CHECK(!held[b] || u[1][dof[b]] == some[b]);
+    }
+    CHECK_MSG(low > 10 && high > 10, "%lld, %lld", (long long)low, (long long)high);
+    uz_aside_allow(1);
+    uz_cg_clear(&cg);
+    uz_multigrid_free(mg);
+    void *room[] = {x, bottom, top, some, u[0], u[1], dof, held};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    uz_body_model_clear(&cells);
+    uz_scene_clear(&scene);
+}
+
+/* Of what is zero at most dofs a certificate's product in double precision is that in double-double. */
+TEST(a_product_with_few_numbers_is_that_of_all_cells)
+{
+    uz_scene scene;
+    uz_body_model cells = make_cells(&scene);
+    const int64_t d = cells.d;
+    double *c = calloc((size_t)d, sizeof(double)), *hi = calloc((size_t)d, sizeof(double)),
+           *lo = calloc((size_t)d, sizeof(double)), *y = calloc((size_t)d, sizeof(double)), most = 0;
+    uz_error err = {0};
+    CHECK(c && hi && lo && y);
+    for (int64_t j = 5; j < d / 3; j += 6007)
+        c[j] = number(j);
+    CHECK_INT(uz_brick_precise_product(hi, lo, y, cells.brick, c, c, &err), UZ_OK);
+    for (int64_t j = 0; j < d; j++)
+        most = fmax(most, fabs(hi[j]));
+    for (int64_t j = 0; j < d; j++)
+        CHECK_MSG(fabs(y[j] - hi[j]) <= 1e-14 * most, "entry %lld", (long long)j);
+    CHECK(most > 0);
+    free(c);
+    free(hi);
+    free(lo);
+    free(y);
     uz_body_model_clear(&cells);
     uz_scene_clear(&scene);
 }
