@@ -7,8 +7,10 @@
 #include "brick/grids.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/pieces.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -232,56 +234,107 @@ static int64_t limit_of(const uz_limits *limits, int64_t *next, int64_t dof)
     return (*next)++;
 }
 
-/* Load and bounds of the finest grid, in units in which single precision holds them. */
-static double read_finest(nested *x, const double *p, const uz_limits *limits)
+/* The finest grid as the threads that share its planes see it. */
+typedef struct {
+    const nested *x;
+    const uz_limits *limits;
+    double down; /* into units in which single precision holds load and bounds */
+    const double *p;
+    double *u;
+    bool *held;
+    int parts;
+} finest;
+
+enum { PARTS_MOST = 16 };
+
+static int64_t first_plane(const finest *f, int part)
 {
+    return (f->x->mg->level[0].cells[2] + 1) * part / f->parts;
+}
+
+/* Of the limits the first that is on a node of this plane, or on a later one. */
+static int64_t first_limit(const finest *f, int64_t plane)
+{
+    const uz_brick *brick = f->x->mg->brick;
+    const int64_t *dof = brick->dof + 3 * plane * (brick->cells[0] + 1) * (brick->cells[1] + 1),
+                  *end = brick->dof + 3 * brick->n_nodes;
+    while (dof < end && *dof < 0)
+        dof++;
+    int64_t low = 0, high = dof < end ? f->limits->n : 0;
+    while (low < high) {
+        const int64_t middle = (low + high) / 2;
+        if ((f->limits->dof ? f->limits->dof[middle] : middle) < *dof)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return dof < end ? low : f->limits->n;
+}
+
+static void read_part(void *ctx, int part)
+{
+    const finest *f = ctx;
+    const nested *x = f->x;
     const uz_brick_level *level = &x->mg->level[0];
-    const int64_t *dof = x->mg->brick->dof;
     const grid_problem *g = &x->grid[0];
-    double most = 0.0;
-    int64_t next = 0;
-    for (int64_t j = 0; j < x->mg->base.n; j++)
-        most = larger(most, fabs(p[j]) / x->mg->unit);
-    for (int64_t b = 0; b < limits->n; b++) /* of bounds those that 0 is beyond */
-        most = larger(larger(most, limits->bottom[b]), -limits->top[b]);
-    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
-    for (int64_t k = 0; k <= level->cells[2]; k++)
+    const int64_t first = first_plane(f, part), end = first_plane(f, part + 1);
+    const int64_t *dof = x->mg->brick->dof + 3 * first * (level->cells[0] + 1) * (level->cells[1] + 1);
+    int64_t next = first_limit(f, first);
+    for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
             for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
                 for (int c = 0; c < 3; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
-                    const int64_t b = limit_of(limits, &next, dof[c]);
-                    g->p[at] = dof[c] >= 0 ? (float)(down * (p[dof[c]] / x->mg->unit)) : 0.0F;
-                    g->bottom[at] = b >= 0 ? (float)(down * limits->bottom[b]) : -INFINITY;
-                    g->top[at] = b >= 0 ? (float)(down * limits->top[b]) : INFINITY;
+                    const int64_t b = limit_of(f->limits, &next, dof[c]);
+                    g->p[at] = dof[c] >= 0 ? (float)(f->down * (f->p[dof[c]] / x->mg->unit)) : 0.0F;
+                    g->bottom[at] = b >= 0 ? (float)(f->down * f->limits->bottom[b]) : -INFINITY;
+                    g->top[at] = b >= 0 ? (float)(f->down * f->limits->top[b]) : INFINITY;
                 }
-    return down;
 }
 
-/* u of the finest grid and what it holds, from the next coarser one. */
-static void write_finest(const nested *x, double *u, bool *held, const uz_limits *limits, double down)
+/* Load and bounds of the finest grid; f->down. */
+static void read_finest(finest *f)
 {
+    const uz_limits *limits = f->limits;
+    double most = larger(0.0, uz_long_max(f->x->mg->base.n, f->p) / f->x->mg->unit);
+    for (int64_t b = 0; b < limits->n; b++) /* of bounds those that 0 is beyond */
+        most = larger(larger(most, limits->bottom[b]), -limits->top[b]);
+    f->down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
+    uz_aside_share(read_part, f, f->parts);
+}
+
+static void write_part(void *ctx, int part)
+{
+    const finest *f = ctx;
+    const nested *x = f->x;
     const uz_brick_level *level = &x->mg->level[0];
     const uz_brick_vectors *v = &x->room->v[0];
-    const int64_t *dof = x->mg->brick->dof;
-    int64_t next = 0;
-    prolong_problem(x, 0, v->x, v->d);
-    for (int64_t k = 0; k <= level->cells[2]; k++)
+    const int64_t first = first_plane(f, part), end = first_plane(f, part + 1);
+    const int64_t *dof = x->mg->brick->dof + 3 * first * (level->cells[0] + 1) * (level->cells[1] + 1);
+    int64_t next = first_limit(f, first);
+    for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
             for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
                 for (int c = 0; c < 3; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i, own = dof[c];
                     if (own < 0)
                         continue;
-                    const int64_t b = limit_of(limits, &next, own);
+                    const int64_t b = limit_of(f->limits, &next, own);
                     const float touches =
                         b >= 0 ? decide(&v->x[at], v->d[at], x->grid[0].bottom[at], x->grid[0].top[at]) : 0.0F;
                     if (b >= 0)
-                        held[b] = touches != 0.0F;
-                    u[own] = touches > 0.0F   ? limits->top[b]
-                             : touches < 0.0F ? limits->bottom[b]
-                                              : (double)v->x[at] / down;
+                        f->held[b] = touches != 0.0F;
+                    f->u[own] = touches > 0.0F   ? f->limits->top[b]
+                                : touches < 0.0F ? f->limits->bottom[b]
+                                                 : (double)v->x[at] / f->down;
                 }
+}
+
+/* u of the finest grid and what it holds, from the next coarser one. */
+static void write_finest(finest *f)
+{
+    prolong_problem(f->x, 0, f->x->room->v[0].x, f->x->room->v[0].d);
+    uz_aside_share(write_part, f, f->parts);
 }
 
 uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
@@ -296,7 +349,10 @@ uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool
     if (!allocate(&x, last))
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory to begin on coarser grids of %lld dofs", (long long)base->n);
-    const double down = status == UZ_OK ? read_finest(&x, p, limits) : 1.0;
+    const int64_t planes = x.mg->level[0].cells[2] + 1;
+    finest f = {&x, limits, 1.0, p, u, held, planes < PARTS_MOST ? (int)planes : PARTS_MOST};
+    if (status == UZ_OK)
+        read_finest(&f);
     for (int l = 1; status == UZ_OK && l <= last; l++)
         restrict_problem(&x, l);
     for (int l = last; status == UZ_OK && l >= 1; l--) {
@@ -309,7 +365,7 @@ uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool
         status = solve_grid(&x, l, stop, err);
     }
     if (status == UZ_OK && !uz_stop_is_due(stop)) {
-        write_finest(&x, u, held, limits, down);
+        write_finest(&f);
         *found = true;
     }
     clear(&x);
