@@ -25,22 +25,13 @@ static void add_cell(uz_skin *skin, const int64_t *node, int corners, int count)
     skin->n_cells++;
 }
 
-/* A side of one element only. */
-static bool is_outside(const uz_mesh *mesh, const uz_corner_table *sides, int64_t i)
-{
-    const uz_face side = sides->item[i];
-    return !sides->same[i] && !sides->same[i + 1] && !(mesh->inside && mesh->inside[side.element] >> side.side & 1);
-}
-
 uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)
 {
     const bool solid = mesh->dim == 3;
-    uz_corner_table sides = {0};
-    int64_t cells = solid ? 0 : mesh->n_elements;
+    uz_group outer = {.n_faces = 0};
     memset(out, 0, sizeof *out);
-    uz_status status = solid ? uz_corner_table_build(&sides, mesh, true, err) : UZ_OK;
-    for (int64_t i = 0; i < sides.count; i++)
-        cells += is_outside(mesh, &sides, i);
+    uz_status status = solid ? uz_outer_sides(&outer, mesh, err) : UZ_OK;
+    const int64_t cells = solid ? outer.n_faces : mesh->n_elements;
     if (status == UZ_OK && solid && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
     if (status == UZ_OK) {
@@ -54,15 +45,14 @@ uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         add_cell(out, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
     }
-    for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
+    for (int64_t i = 0; status == UZ_OK && i < outer.n_faces; i++) {
         int64_t node[UZ_FACE_NODES];
-        if (!is_outside(mesh, &sides, i))
-            continue;
-        const int count = uz_mesh_face(node, mesh, sides.item[i]);
-        const uz_element_kind kind = (uz_element_kind)mesh->kind[sides.item[i].element];
-        add_cell(out, node, uz_element_type_of(kind)->side[sides.item[i].side].corners, count);
+        const uz_face side = outer.face[i];
+        const int count = uz_mesh_face(node, mesh, side);
+        add_cell(out, node, uz_element_type_of((uz_element_kind)mesh->kind[side.element])->side[side.side].corners,
+                 count);
     }
-    uz_corner_table_clear(&sides);
+    free(outer.face);
     if (status != UZ_OK)
         uz_skin_clear(out);
     return status;

@@ -185,3 +185,27 @@ int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, 
     sorted_corners(there, mesh, table->item[low]);
     return compare_corners(there + 1, wanted + 1) == 0 ? low : -1;
 }
+
+/* A side that lies within a subdivided body has no other with the same corners. */
+static bool is_outside(const uz_mesh *mesh, const uz_corner_table *sides, int64_t i)
+{
+    const uz_face side = sides->item[i];
+    return !sides->same[i] && !sides->same[i + 1] && !(mesh->inside && mesh->inside[side.element] >> side.side & 1);
+}
+
+uz_status uz_outer_sides(uz_group *out, const uz_mesh *mesh, uz_error *err)
+{
+    uz_corner_table sides = {0};
+    int64_t count = 0;
+    *out = (uz_group){.kind = UZ_GROUP_FACES};
+    uz_status status = uz_corner_table_build(&sides, mesh, true, err);
+    for (int64_t i = 0; i < sides.count; i++)
+        count += is_outside(mesh, &sides, i);
+    if (status == UZ_OK && !(out->face = uz_alloc(count, sizeof *out->face)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld outer sides", (long long)count);
+    for (int64_t i = 0; status == UZ_OK && i < sides.count; i++)
+        if (is_outside(mesh, &sides, i))
+            out->face[out->n_faces++] = sides.item[i];
+    uz_corner_table_clear(&sides);
+    return status;
+}
