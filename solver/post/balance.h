@@ -3,6 +3,7 @@
 #define UZ_FIELDS_BALANCE_H
 
 #include "assembly/assembly.h"
+#include "post/interpenetration.h"
 #include "uzawa.h"
 
 /* What is known of a body that its stiffness at rest does not tell: forces by node (n_nodes x dim), of its elements and
@@ -35,6 +36,8 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
                          const uz_coarse_contact *coarse, uz_error *err);
 /* Those of them that are about the mesh alone, of an answer of large deformation. */
 void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene *scene);
+/* Warns where bodies of large deformation pass through each other, or themselves, under this part of the load. */
+void uz_doubt_interpenetration(uz_evaluation *out, const uz_interpenetration *passed, int dim, double load);
 /* Of an answer whose mesh is told to be off by more than was known then: coarse_mesh tells as much. */
 void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error);
 /* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the

@@ -289,6 +289,20 @@ void uz_doubt_uncompared(uz_evaluation *out, const char *lacked)
 
 /* ---- contact */
 
+void uz_doubt_interpenetration(uz_evaluation *out, const uz_interpenetration *passed, int dim, double load)
+{
+    char at[80], when[48] = "";
+    if (!(passed->depth > 0))
+        return;
+    snprintf(at, sizeof at, dim == 2 ? "(%.4g, %.4g)" : "(%.4g, %.4g, %.4g)", passed->at[0], passed->at[1],
+             passed->at[2]);
+    if (load < 1)
+        snprintf(when, sizeof when, "under %.4g of the load ", load);
+    warn(out, "interpenetration", passed->part,
+         "%sthe body stands %.3g deep in itself, or one of its parts in another, at %s: name these sides as a contact",
+         when, passed->depth, at);
+}
+
 /* The deepest that a node begins in the other body, in lengths of the face that it meets. */
 static double deepest_overlap(int64_t *node, const uz_body_model *model)
 {

@@ -402,6 +402,18 @@ static uz_status begin_near(uz_finite_run *run, uz_error *err)
     return status;
 }
 
+/* Equilibria on the way count as the last one does. */
+static uz_status look_for_passing(uz_finite_run *run, double t, uz_error *err)
+{
+    uz_interpenetration now;
+    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, run->at.u, err);
+    if (status == UZ_OK && now.depth > run->passed.depth) {
+        run->passed = now;
+        run->passed_under = t;
+    }
+    return status;
+}
+
 /* Until the whole load is on, or no further part of it holds. Of a way that begins where another one has ended before
  * its whole load nothing is put on. */
 static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_error *err)
@@ -436,8 +448,9 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
             found->least_det = run->certificate.least_det;
             found->most = run->step_qps > found->most ? run->step_qps : found->most;
             step *= run->step_qps <= FEW ? 2 : 1;
-            if (!keep(&last, run))
-                status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+            status = keep(&last, run) ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+            if (status == UZ_OK && t < 1)
+                status = look_for_passing(run, t, err);
             continue;
         }
         *why = part;

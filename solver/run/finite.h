@@ -19,6 +19,7 @@
 #include "finite/finite_body.h"
 #include "finite/follower.h"
 #include "obstacle/obstacle.h"
+#include "post/interpenetration.h"
 #include "run/setup.h"
 #include "uzawa.h"
 
@@ -147,6 +148,8 @@ typedef struct {
     uz_timings spent;
     uz_outcome stopped;
     uz_finite_certificate certificate; /* of `at`, where a part has settled */
+    uz_interpenetration passed;        /* the deepest of the parts on the way, and under what load that was */
+    double passed_under;
     uz_finite found;
 } uz_finite_run;
 

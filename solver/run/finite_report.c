@@ -219,6 +219,17 @@ static void balance(uz_summary *s, const uz_finite_run *run)
     }
 }
 
+/* Where the answer passes through itself, or else the deepest that others on the way to it did. */
+static uz_status doubt_passing(uz_evaluation *out, const uz_finite_run *run, uz_error *err)
+{
+    uz_interpenetration now;
+    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, run->at.u, err);
+    const bool ends = now.depth > 0;
+    if (status == UZ_OK)
+        uz_doubt_interpenetration(out, ends ? &now : &run->passed, run->base.mesh.dim, ends ? 1 : run->passed_under);
+    return status;
+}
+
 uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, double tried, uz_error *err)
 {
     uz_result *result = uz_alloc_zero(1, sizeof *result);
@@ -240,6 +251,9 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
         status = mesh_error(&result->summary.discretization_error, run, err);
     if (status == UZ_OK) {
         balance(&result->summary, run);
+        status = doubt_passing(result->evaluation, run, err);
+    }
+    if (status == UZ_OK) {
         uz_doubt_mesh(result, &run->at.rows, &run->scene);
         status = uz_finite_quantities(result, run, err);
     }
