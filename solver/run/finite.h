@@ -2,6 +2,7 @@
  *
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
+ *     uz_finite_place_find  finite_place.c  what follows from a displacement
  *     uz_finite_chord    finite_chord.c    steps on the factor of the last one
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
