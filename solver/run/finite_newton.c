@@ -373,7 +373,8 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     run->K = K;
     if (found != UZ_OK)
         return found;
-    run->settings.step = !(run->norm < CHORD_STEP); /* from there on each digit counts */
+    /* from there on each digit counts; of the step from a place without energy the norm is not known */
+    run->settings.step = !(run->norm < CHORD_STEP) || (run->step_qps == 1 && run->norm == 0);
     const double stiffest = run->stiffest;
     const bool roughly = was_large(run);
     addition add = {.hold = roughly ? 0 : run->hold, .shift = run->shift / LESS_SHIFT};
