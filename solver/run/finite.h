@@ -145,6 +145,7 @@ typedef struct {
     double stiffest, grain;      /* of the undeformed body: its stiffest dof; what rounding may leave of an energy */
     int64_t step_qps;
     bool turned;     /* `at`, or the last trial, is not straight on from the place before (finite_turn.c) */
+    bool unturned;   /* no part of it has turned on that way, as far as is known */
     uz_result *last; /* of the last contact problem: methods and factor */
     uz_timings spent;
     uz_outcome stopped;

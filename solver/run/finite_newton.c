@@ -381,9 +381,10 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     add.shift = add.shift < FIRST_SHIFT ? 0 : add.shift;
     double held = 0, shifted = 0; /* what the tangent has of them */
     bool pressed = false, more = true, fresh = true;
-    double *step = run->step_qps > 0 && add.shift == 0 && is_more(run->norm, LARGE_STEP) && !run->turned
-                       ? run->step
-                       : NULL; /* run->trial is the place before */
+    double *step =
+        run->step_qps > 0 && add.shift == 0 && is_more(run->norm, LARGE_STEP) && !run->turned && !run->unturned
+            ? run->step
+            : NULL; /* run->trial is the place before */
     for (int64_t i = 0; i < run->n && step; i++)
         step[i] = run->at.u[i] - run->trial.u[i];
     for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
@@ -458,6 +459,7 @@ static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, dou
 {
     uz_status status = UZ_OK;
     run->turned = !run->pairs && !run->base.spring && run->base.n_rigid == 0 && is_more(run->norm, TURNING_STEP);
+    run->unturned = false;
     bool again = true;
     *fits = false;
     while (status == UZ_OK && again) {

@@ -15,6 +15,9 @@
 
 #include <stdlib.h>
 
+/* What turning adds to a step that is less than this part of its strain is none. */
+#define LITTLE_TURNING 0.01
+
 /* run->v = K^-1 p on the metric, which takes the tangent's place: no contact has a say in it, but its dofs come last,
  * so that the order of tangents does. */
 static uz_status solve_metric(uz_finite_run *run, uz_error *err)
@@ -46,6 +49,7 @@ uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
     double *force = run->trial.force; /* room until the place is looked at */
     uz_turning_of(&found, force, model, run->at.u, run->trial.u);
     *turned = found.turning > found.strain;
+    run->unturned = found.turning < LITTLE_TURNING * LITTLE_TURNING * found.strain;
     if (!*turned)
         return UZ_OK;
     uz_finite_forget_factors(run);
