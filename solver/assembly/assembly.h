@@ -241,8 +241,9 @@ void uz_body_turned_clear(uz_body_model *turned);
 /* given (n_fixed): in the places of groups' motions the step from u to what is prescribed; others stay. Groups in space
  * have all rotations held, or none, or two that are prescribed as none. */
 void uz_rigid_ways(double *given, const uz_body_model *model, const double *prescribed, const double *u);
-/* u, at a linear step from `from`, becomes one that moves groups as rigid bodies, and what follows them with these. */
-void uz_rigid_step(double *u, const uz_body_model *model, const double *from);
+/* u, at a linear step from `from`, becomes one that moves groups as rigid bodies, and what follows them with these: by
+ * exp(w), polar: where w is not prescribed by the rotation of the polar decomposition of I + w. */
+void uz_rigid_step(double *u, const uz_body_model *model, const double *from, bool polar);
 /* Of the displacement u of node a what it has from rigid groups, whose dofs tell a step alone. */
 void uz_rigid_part(double at[3], const uz_body_model *model, int64_t a, const double *u);
 /* K and K_fixed of `to` get what the forces f (n_nodes x dim) make of rotations from u. Those of nodes that follow

@@ -255,7 +255,17 @@ static void follow_others(double *u, const uz_body_model *model)
     }
 }
 
-void uz_rigid_step(double *u, const uz_body_model *model, const double *from)
+/* Is all of a group's rotation prescribed? */
+static bool turn_is_given(const uz_body_model *model, const uz_rigid_group *group)
+{
+    const int dim = model->mesh.dim;
+    bool given = true;
+    for (int c = 0; c < (dim == 2 ? 1 : 3); c++)
+        given = given && model->dof[group->anchor[1] * dim + c] < 0;
+    return given;
+}
+
+void uz_rigid_step(double *u, const uz_body_model *model, const double *from, bool polar)
 {
     const int dim = model->mesh.dim;
     for (int64_t k = 0; k < model->n_rigid; k++) {
@@ -263,6 +273,9 @@ void uz_rigid_step(double *u, const uz_body_model *model, const double *from)
         double t[3], R[9], dt[3], w[3], turn[9];
         uz_rigid_place(t, R, model, group, from);
         uz_rigid_motion(dt, w, model, group, from, u);
+        const double tangent = sqrt(uz_dot3(w, w));
+        for (int c = 0; c < 3 && polar && tangent > 0 && !turn_is_given(model, group); c++)
+            w[c] *= atan(tangent) / tangent;
         uz_rotation(turn, w);
         multiply(turn, turn, R);
         for (int c = 0; c < 3; c++)

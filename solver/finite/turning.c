@@ -72,7 +72,7 @@ UZ_INLINE void turn(four *turning, four *strain, four H[3][3], four h[3][3], int
 typedef struct {
     const uz_finite_rule *rule;
     const uz_element *element;
-    const double *u, *step;
+    const double *u, *step, *near; /* near: from u on; NULL: there */
 } task;
 
 /* force: nodes x dim. */
@@ -81,11 +81,13 @@ UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int di
     const uz_finite_rule *rule = x->rule;
     const bool ring = dim == 2 && rule->model == UZ_AXISYMMETRIC;
     uz_rest rest;
-    uz_gradients from, by;
+    uz_gradients from, by, near;
     four sum[3][GROUPS] = {{{0}}};
     uz_rest_of(&rest, rule, x->element, dim, ring);
     uz_find_gradients(from, rule, &rest, x->u, dim, ring);
     uz_find_gradients(by, rule, &rest, x->step, dim, ring);
+    if (x->near)
+        uz_find_gradients(near, rule, &rest, x->near, dim, ring);
     for (int p = 0; p < rule->gauss; p += LANES) {
         four H[3][3], h[3][3], turning, strain, around = {0};
         const four weight = x->element->lame.mu * *uz_four_from(&rest.volume[p]);
@@ -95,8 +97,15 @@ UZ_INLINE void add_turning(uz_turning *out, double *force, const task *x, int di
                 h[c][i] = *uz_four_from(&by[c][i][p]);
             }
         turn(&turning, &strain, H, h, dim);
-        if (ring)
-            around = weight * *uz_four_from(&by[2][2][p]) * *uz_four_from(&rest.per_radius[p]);
+        for (int c = 0; c < dim && x->near; c++)
+            for (int i = 0; i < dim; i++)
+                H[c][i] -= *uz_four_from(&near[c][i][p]);
+        if (ring) {
+            around = *uz_four_from(&by[2][2][p]);
+            if (x->near)
+                around -= *uz_four_from(&near[2][2][p]);
+            around = weight * around * *uz_four_from(&rest.per_radius[p]);
+        }
         for (int g = p; g < p + LANES && g < rule->gauss; g++) {
             out->turning += weight[g - p] * turning[g - p];
             out->strain += weight[g - p] * strain[g - p];
@@ -182,7 +191,8 @@ static void use_rule(uz_finite_rule *rule, const uz_element *element)
         uz_finite_rule_of(rule, element->kind, element->model);
 }
 
-void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to)
+void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to,
+                   const double *near)
 {
     const uz_mesh *mesh = &model->mesh;
     const int dim = mesh->dim;
@@ -192,7 +202,9 @@ void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, c
     memset(force, 0, (size_t)(dim * mesh->n_nodes) * sizeof *force);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         uz_element element;
-        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], step[UZ_ELEMENT_DOFS], own[UZ_ELEMENT_DOFS];
+        double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], step[UZ_ELEMENT_DOFS], own[UZ_ELEMENT_DOFS],
+            back[UZ_ELEMENT_DOFS];
+        uz_turning rigid = {0};
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
         uz_body_element(&element, xyz, model, e);
@@ -200,8 +212,10 @@ void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, c
         for (int i = 0; i < dim * count; i++) {
             u[i] = from[dim * node[i / dim] + i % dim];
             step[i] = to[dim * node[i / dim] + i % dim] - u[i];
+            back[i] = near ? near[dim * node[i / dim] + i % dim] - u[i] : 0;
         }
-        by.add_turning(out, own, &(task){&rule, &element, u, step});
+        by.add_turning(uz_is_unstrained(model, node, count) ? &rigid : out, own,
+                       &(task){&rule, &element, u, step, near ? back : NULL});
         for (int i = 0; i < dim * count; i++)
             force[dim * node[i / dim] + i % dim] += own[i];
     }

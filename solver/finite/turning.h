@@ -17,10 +17,13 @@ typedef struct {
     double strain;  /* of sym g */
 } uz_turning;
 
-/* Of the step between two displacements (n_nodes x dim each), det F > 0 at the first.
- *   force  n_nodes x dim, along the axes: integral mu (R (I + sym g) F - F) : grad v; of rings with u_r / r around them
- *          as the step has it */
-void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to);
+/* Of the step between two displacements (n_nodes x dim each), det F > 0 at the first; out: of all that is not within a
+ * rigid group.
+ *   near   n_nodes x dim, what is gone on from; NULL: the first
+ *   force  n_nodes x dim, along the axes: integral mu (R (I + sym g) F - F') : grad v, F' that of `near`; of rings with
+ *          u_r / r around them as the step has it */
+void uz_turning_of(uz_turning *out, double *force, const uz_body_model *model, const double *from, const double *to,
+                   const double *near);
 
 /* K and K_fixed of `metric`, a copy of `model` as of uz_finite_tangent_of, become integral mu grad v : grad v. */
 void uz_turning_metric(uz_body_model *metric, const uz_body_model *model);

@@ -396,7 +396,7 @@ static uz_status begin_near(uz_finite_run *run, uz_error *err)
     if (status == UZ_OK && fits) { /* what is left of the way of supports and groups */
         uz_finite_restrict(run->v, &run->at);
         uz_finite_lead(run->trial.u, &run->at, run->v);
-        uz_rigid_step(run->trial.u, &run->base, run->at.u);
+        uz_rigid_step(run->trial.u, &run->base, run->at.u, false);
         memcpy(run->at.u, run->trial.u, (size_t)run->n * sizeof *run->near);
     }
     return status;

@@ -160,6 +160,8 @@ typedef struct {
 uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err);
 uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run *run, uz_error *err);
 void uz_finite_place_clear(uz_finite_place *place);
+/* What is prescribed there, and rigid groups as they are there. */
+uz_status uz_finite_place_groups(uz_finite_place *place, const uz_finite_run *run, uz_error *err);
 /* The free dofs (d) of a place, and the displacement (n) that others lead to from there by a straight step. */
 void uz_finite_restrict(double *v, const uz_finite_place *place);
 void uz_finite_lead(double *to, const uz_finite_place *place, const double *v);
@@ -190,11 +192,11 @@ uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_f
 
 /* Another tangent has another factor; its ordering stays. */
 void uz_finite_forget_factors(uz_finite_run *run);
-/* p less what run->tangent makes of the ways that supports still have to go from run->at. *moved: are there any? */
-void uz_finite_move_supports(bool *moved, uz_finite_run *run);
+/* p less what run->tangent makes of the ways that supports still have to go from a place. *moved: are there any? */
+void uz_finite_move_supports(bool *moved, uz_finite_run *run, const uz_finite_place *from);
 
-/* run->trial.u becomes the place that the step from run->at leads to if its parts turn, where that makes more of a
- * difference than the strain that the step is for (*turned); run->tangent is of no use then. */
+/* run->trial.u, a linear step from run->at, becomes the place that it leads to if its parts turn, where that makes more
+ * of a difference than the strain that the step is for (*turned); run->tangent is of no use then. */
 uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err);
 
 /* May a point go straight from x along `way`? Where it is within the obstacle it has to be so on the side where it went

@@ -153,9 +153,8 @@ static uz_status add_curvature(uz_finite_run *run, uz_error *err)
     return status;
 }
 
-void uz_finite_move_supports(bool *moved, uz_finite_run *run)
+void uz_finite_move_supports(bool *moved, uz_finite_run *run, const uz_finite_place *at)
 {
-    const uz_finite_place *at = &run->at;
     const uz_body_model *model = &run->base;
     const int dim = model->mesh.dim;
     *moved = false;
@@ -185,7 +184,7 @@ static void load_step(bool *moved, uz_finite_run *run)
     for (int64_t i = 0; i < run->n; i++)
         rest[i] = at->loads[i] - at->force[i];
     uz_gather_nodal(run->p, model, rest);
-    uz_finite_move_supports(moved, run);
+    uz_finite_move_supports(moved, run, at);
     uz_finite_restrict(run->v, at);
     uz_csc_symv(run->p, run->K, 1, run->v);
 }
@@ -470,16 +469,17 @@ static void find_work(uz_finite_run *run)
 static uz_status find_part(bool *fits, uz_finite_run *run, const double *to, double part, uz_error *err)
 {
     uz_status status = UZ_OK;
-    run->turned = !run->pairs && !run->base.spring && run->base.n_rigid == 0 && is_more(run->norm, TURNING_STEP);
+    run->turned = !run->pairs && !run->base.spring && is_more(run->norm, TURNING_STEP);
     run->unturned = false;
     bool again = true;
     *fits = false;
     while (status == UZ_OK && again) {
         for (int64_t i = 0; i < run->n; i++)
             run->trial.u[i] = part == 1 ? to[i] : run->at.u[i] + part * (to[i] - run->at.u[i]);
-        uz_rigid_step(run->trial.u, &run->base, run->at.u);
         if (run->turned)
             status = uz_finite_turn(&run->turned, run, err);
+        if (!run->turned)
+            uz_rigid_step(run->trial.u, &run->base, run->at.u, false);
         if (status == UZ_OK)
             status = uz_finite_place_find(fits, &run->trial, run, err);
         again = run->turned && !*fits; /* straight on, then */
@@ -785,7 +785,7 @@ static uz_status look_back(uz_part *out, const uz_finite_run *run, const double 
  * what is asked for; *done as of ask_certificate. That of the first one is no rate yet. to (n): room. */
 static uz_status follow_chords(bool *done, uz_part *out, uz_finite_run *run, double *to, uz_error *err)
 {
-    const bool plain = !run->pairs && !run->skew.ptr && run->base.n_rigid == 0 && run->shift == 0 && !run->turned;
+    const bool plain = !run->pairs && !run->skew.ptr && run->shift == 0 && !run->turned;
     uz_setup *setup = NULL;
     bool goes_on = plain && run->norm > 0 && run->norm < CHORD_STEP, asked = false;
     if (!goes_on)

@@ -85,6 +85,14 @@ static uz_status find_gaps(uz_finite_place *place, uz_finite_run *run, uz_error 
     return UZ_OK;
 }
 
+uz_status uz_finite_place_groups(uz_finite_place *place, const uz_finite_run *run, uz_error *err)
+{
+    uz_body_turned_clear(&place->turned);
+    memcpy(place->given, run->prescribed, (size_t)run->base.n_fixed * sizeof *place->given);
+    uz_rigid_ways(place->given, &run->base, run->prescribed, place->u);
+    return uz_body_turned(&place->turned, &run->base, place->u, err);
+}
+
 uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run *run, uz_error *err)
 {
     uz_error own = {0};
@@ -96,10 +104,8 @@ uz_status uz_finite_place_find(bool *fits, uz_finite_place *place, uz_finite_run
     memcpy(place->loads, run->loads, (size_t)run->n * sizeof *place->loads);
     uz_status status = run->follows ? uz_follower_loads(place->loads, &run->base, &run->scene, place->u, &own) : UZ_OK;
     run->scene.place = place->u;
-    memcpy(place->given, run->prescribed, (size_t)run->base.n_fixed * sizeof *place->given);
-    uz_rigid_ways(place->given, &run->base, run->prescribed, place->u);
     if (status == UZ_OK)
-        status = uz_body_turned(&place->turned, &run->base, place->u, &own);
+        status = uz_finite_place_groups(place, run, &own);
     if (status == UZ_OK)
         status = uz_body_model_move(&place->rows, &place->turned, &run->scene, &own);
     if (status == UZ_OK)

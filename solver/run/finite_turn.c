@@ -3,8 +3,9 @@
  * A step that is made by the tangent takes parts that turn along it, which stretches them: a beam that is to bend by a
  * right angle becomes several times as long, and Newton's method halves that from step to step. Where what turning adds
  * is more than the strain that the step is made for, the place that it leads to is the one whose gradients are nearest
- * to those of the turned step (finite/turning.h), with supports where they are to be. It is a place like any other: the
- * next step begins there, and the certificate asks nothing of how it was reached. */
+ * to those of the turned step (finite/turning.h), with supports where they are to be; rigid groups are first turned as
+ * elements are, and it is sought from there. It is a place like any other: the next step begins there, and the
+ * certificate asks nothing of how it was reached. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
@@ -14,6 +15,7 @@
 #include "run/setup_cache.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 /* What turning adds to a step that is less than this part of its strain is none. */
 #define LITTLE_TURNING 0.01
@@ -44,24 +46,35 @@ static uz_status solve_metric(uz_finite_run *run, uz_error *err)
 uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
 {
     const uz_body_model *model = &run->base;
+    const size_t bytes = (size_t)run->n * sizeof *run->step;
+    uz_finite_place *to = &run->trial;
     bool moved;
     uz_turning found;
-    double *force = run->trial.force; /* room until the place is looked at */
-    uz_turning_of(&found, force, model, run->at.u, run->trial.u);
+    double *force = to->force, *near = run->step; /* room until the place is looked at, and the next tangent */
+    memcpy(near, model->n_rigid > 0 ? to->u : run->at.u, bytes);
+    uz_rigid_step(near, model, run->at.u, true);
+    uz_turning_of(&found, force, model, run->at.u, to->u, model->n_rigid > 0 ? near : NULL);
     *turned = found.turning > found.strain;
     run->unturned = found.turning < LITTLE_TURNING * LITTLE_TURNING * found.strain;
     if (!*turned)
         return UZ_OK;
+    memcpy(to->u, near, bytes);
     uz_finite_forget_factors(run);
-    uz_turning_metric(&run->tangent, model);
-    uz_gather_nodal(run->p, model, force);
-    uz_finite_move_supports(&moved, run);
-    const uz_status status = solve_metric(run, err);
+    uz_status status = uz_finite_place_groups(to, run, err);
     if (status != UZ_OK)
         return status;
-    uz_restrict_nodal(run->Kv, model, run->at.u);
+    run->tangent.follow = to->turned.follow;
+    uz_turning_metric(&run->tangent, model);
+    uz_gather_nodal(run->p, &to->turned, force);
+    uz_finite_move_supports(&moved, run, to);
+    status = solve_metric(run, err);
+    if (status != UZ_OK)
+        return status;
+    uz_finite_restrict(run->Kv, to);
     for (int64_t j = 0; j < run->d; j++)
         run->v[j] += run->Kv[j];
-    uz_recover_nodal(run->trial.u, model, run->v, run->prescribed);
+    uz_finite_lead(near, to, run->v);
+    uz_rigid_step(near, model, to->u, false);
+    memcpy(to->u, near, bytes);
     return UZ_OK;
 }

@@ -63,7 +63,7 @@ static double step(double *u, const uz_body_model *turned, const uz_body_model *
     uz_recover_nodal(u, turned, v, NULL);
     for (int64_t i = 0; i < n; i++)
         u[i] = from[i] + (uz_is_rigid(model, i / model->mesh.dim) ? t * u[i] : 0);
-    uz_rigid_step(u, model, from);
+    uz_rigid_step(u, model, from, false);
     for (int64_t i = 0; i < n; i++)
         work += uz_is_rigid(model, i / model->mesh.dim) ? f[i] * u[i] : 0;
     return work;
@@ -130,6 +130,52 @@ TEST(steps_are_rigid_and_of_second_order_what_is_told)
         free(f);
         free(v);
         free(p);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
+}
+
+/* From one place to the next: by the angle whose tangent is that of the linear step, unless that is prescribed. */
+TEST(polar_steps_turn_by_less_unless_all_is_prescribed)
+{
+    qp_random rng = {5};
+    for (int k = 0; k < 4; k++) {
+        const int dim = 2 + k % 2;
+        const bool given = k >= 2;
+        uz_scene s = held(dim);
+        for (int c = dim == 2 ? 2 : 0; c < 3 && given; c++)
+            s.supports[s.n_supports - 1].turn[c] = 0;
+        uz_body_model model = body_model(&s);
+        const uz_rigid_group *group = model.rigid;
+        const int64_t n = model.mesh.n_nodes * dim;
+        double *from = body_room(n, sizeof *from), *u = body_room(n, sizeof *u);
+        for (int turn = 0; turn < 2; turn++) {
+            double w[3], told[3], t[3], R[2][9], by[9] = {0};
+            random_vector(w, &rng, 1.2);
+            for (int c = 0; c < 3 && dim == 2; c++)
+                w[c] = c == 2 ? 1.2 : 0;
+            uz_rigid_place(t, R[0], &model, group, from);
+            for (int64_t a = 0; a < model.mesh.n_nodes; a++) {
+                double r[3] = {0}, way[3];
+                for (int c = 0; c < dim; c++)
+                    r[c] = model.mesh.xyz[dim * a + c] + from[dim * a + c] - group->point[c] - t[c];
+                uz_cross3(way, w, r);
+                for (int c = 0; c < dim; c++)
+                    u[dim * a + c] = from[dim * a + c] + way[c];
+            }
+            uz_rigid_step(u, &model, from, true);
+            uz_rigid_place(t, R[1], &model, group, u);
+            for (int i = 0; i < 9; i++)
+                for (int c = 0; c < 3; c++)
+                    by[i] += R[1][3 * (i / 3) + c] * R[0][3 * (i % 3) + c];
+            uz_rotation_vector(told, by);
+            const double part = given ? 1 : atan(1.2) / 1.2;
+            for (int c = 0; c < 3; c++)
+                CHECK_MSG(fabs(told[c] - part * w[c]) < 1e-12, "%d %d: %g of %g", dim, given, told[c], w[c]);
+            memcpy(from, u, (size_t)n * sizeof *u);
+        }
+        free(from);
+        free(u);
         uz_body_model_clear(&model);
         uz_scene_clear(&s);
     }

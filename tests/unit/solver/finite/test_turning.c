@@ -43,18 +43,22 @@ static void check_step(uz_turning *found, const uz_body_model *model, matrix F, 
            *p = body_room(model->d, sizeof *p), *v = body_room(model->d, sizeof *v), largest = 0;
     CHECK_INT(uz_finite_tangent_of(&metric, model, &err), UZ_OK);
     uz_turning_metric(&metric, model);
-    uz_turning_of(found, force, model, at, there);
-    uz_gather_nodal(p, model, force);
-    uz_restrict_nodal(v, model, u);
-    for (int64_t j = 0; j < model->d; j++)
-        largest = fmax(largest, fabs(p[j]));
-    uz_csc_symv(p, &metric.K, -1, v);
-    for (int64_t i = 0; i < n; i++)
-        for (int64_t q = model->dof[i] < 0 ? metric.K_fixed.ptr[-1 - model->dof[i]] : 0;
-             model->dof[i] < 0 && q < metric.K_fixed.ptr[-model->dof[i]]; q++)
-            p[metric.K_fixed.idx[q]] -= metric.K_fixed.val[q] * u[i];
-    for (int64_t j = 0; j < model->d; j++)
-        CHECK_MSG(fabs(p[j]) < 1e-12 * largest, "%.3g of %.3g", p[j], largest);
+    for (int near = 0; near < 2; near++) { /* from F on, and from F + h */
+        uz_turning_of(found, force, model, at, there, near ? there : NULL);
+        for (int64_t i = 0; i < n && near; i++)
+            u[i] -= there[i] - at[i];
+        uz_gather_nodal(p, model, force);
+        uz_restrict_nodal(v, model, u);
+        for (int64_t j = 0; j < model->d && !near; j++)
+            largest = fmax(largest, fabs(p[j]));
+        uz_csc_symv(p, &metric.K, -1, v);
+        for (int64_t i = 0; i < n; i++)
+            for (int64_t q = model->dof[i] < 0 ? metric.K_fixed.ptr[-1 - model->dof[i]] : 0;
+                 model->dof[i] < 0 && q < metric.K_fixed.ptr[-model->dof[i]]; q++)
+                p[metric.K_fixed.idx[q]] -= metric.K_fixed.val[q] * u[i];
+        for (int64_t j = 0; j < model->d; j++)
+            CHECK_MSG(fabs(p[j]) < 1e-12 * largest, "%.3g of %.3g", p[j], largest);
+    }
     CHECK(largest > 0);
     uz_finite_tangent_clear(&metric);
     free(at);
