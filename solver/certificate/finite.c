@@ -11,6 +11,7 @@
 #include "certificate/rigid_groups.h"
 #include "certificate/swallowed.h"
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
@@ -62,44 +63,54 @@ typedef struct {
     bool ring;
 } point_at;
 
+/* What is added for four nodes at a time. */
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+enum { LANES = 4 };
+
 /* Forces in extended precision; of the tangent, whose entries are doubles, the half up to the diagonal, as
- * rows[p][k][b]: of dof p, axis k and node b. Inlined where dim is a constant. */
-static inline __attribute__((always_inline)) void add_point_of(long double *force, double *rows, long double weight,
-                                                               const point_at *x, const uz_piola *at, int dim,
-                                                               bool ring)
+ * rows[p][k][b]: of dof p, axis k and node b, with others beyond it. Inlined where dim is a constant. */
+UZ_INLINE void add_point_of(long double *force, double *rows, long double weight, const point_at *x, const uz_piola *at,
+                            int dim, bool ring)
 {
     static const int PLANE[] = {0, 1, 3, 4, 8}, SPACE[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
     const int *entry = dim == 2 ? PLANE : SPACE, count = dim * dim + ring, nodes = x->nodes; /* those of F */
-    double A[9][9], grad[4][UZ_ELEMENT_NODES];
-    for (int i = 0; i < count; i++)
+    double A[9][9], grad[4][UZ_ELEMENT_NODES] = {{0}};
+    long double P[9] = {0};
+    for (int i = 0; i < count; i++) {
+        P[i] = weight * at->P[entry[i]];
         for (int k = 0; k < count; k++)
             A[i][k] = (double)weight * at->A[entry[i]][entry[k]];
+    }
     for (int a = 0; a < nodes; a++)
         for (int J = 0; J <= dim; J++)
             grad[J][a] = J < dim ? x->grad[a][J] : x->around[a];
     for (int p = 0; p < dim * nodes; p++) {
         const int a = p / dim, i = p % dim, reach = dim + (ring && i == 0); /* moves what is around the axis, too */
+        long double pulled = force[p];
         double by[9] = {0};
         for (int J = 0; J < reach; J++) {
             const int own = J < dim ? dim * i + J : count - 1;
-            force[p] += weight * at->P[entry[own]] * grad[J][a];
+            pulled += P[own] * grad[J][a];
             for (int k = 0; k < count; k++)
                 by[k] += A[own][k] * grad[J][a];
         }
+        force[p] = pulled;
         for (int k = 0; k < dim; k++) {
-            double *row = rows + (p * dim + k) * nodes;
+            double *row = rows + (p * dim + k) * UZ_ELEMENT_NODES;
             const double around = ring && k == 0 ? by[count - 1] : 0;
-            for (int b = 0; b <= a; b++) {
-                double sum = ring ? around * grad[dim][b] : 0;
+            for (int b = 0; b <= a; b += LANES) {
+                four sum = {0};
+                if (ring)
+                    sum = around * *(const four *)(grad[dim] + b);
                 for (int L = 0; L < dim; L++)
-                    sum += by[dim * k + L] * grad[L][b];
-                row[b] += sum;
+                    sum += by[dim * k + L] * *(const four *)(grad[L] + b);
+                *(four *)(row + b) += sum;
             }
         }
     }
 }
 
-static void add_point(long double *force, double *rows, long double weight, const point_at *x, const uz_piola *at)
+UZ_INLINE void add_point(long double *force, double *rows, long double weight, const point_at *x, const uz_piola *at)
 {
     if (x->dim == 3)
         add_point_of(force, rows, weight, x, at, 3, false);
@@ -107,6 +118,17 @@ static void add_point(long double *force, double *rows, long double weight, cons
         add_point_of(force, rows, weight, x, at, 2, true);
     else
         add_point_of(force, rows, weight, x, at, 2, false);
+}
+
+UZ_AVX2 static void add_point_wide(long double *force, double *rows, long double weight, const point_at *x,
+                                   const uz_piola *at)
+{
+    add_point(force, rows, weight, x, at);
+}
+
+static void add_point_plain(long double *force, double *rows, long double weight, const point_at *x, const uz_piola *at)
+{
+    add_point(force, rows, weight, x, at);
 }
 
 /* Returns what must be positive: det F, which in the plane is not where the stretch across it is not. */
@@ -121,9 +143,10 @@ static long double deform(point_at *x, double *measure, const uz_element *elemen
     *measure = uz_element_gradients(x->grad, element, local);
     *measure *= uz_element_around(x->around, element, x->grad, local);
     for (int i = 0; i < 9; i++) {
-        F[i] = (i % 4 == 0) + (i == 8 ? element->across : 0);
+        long double sum = (i % 4 == 0) + (i == 8 ? element->across : 0);
         for (int a = 0; a < x->nodes && i / 3 < dim && i % 3 < dim; a++)
-            F[i] += ((long double)u[dim * a + i / 3] - u[i / 3]) * x->grad[a][i % 3];
+            sum += ((long double)u[dim * a + i / 3] - u[i / 3]) * x->grad[a][i % 3];
+        F[i] = sum;
     }
     for (int a = 0; a < x->nodes && x->ring; a++)
         F[8] += (long double)u[2 * a] * x->around[a];
@@ -220,7 +243,7 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_body_model *model = w->of->model;
     const int dim = model->mesh.dim;
     double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], measure;
-    double rows[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
+    double rows[UZ_ELEMENT_DOFS * 3 * UZ_ELEMENT_NODES], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
     long double force[UZ_ELEMENT_DOFS] = {0};
     uz_element element;
     point_at x;
@@ -233,11 +256,12 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_lame lame = uz_lame_in_space(element.model, element.lame);
     const uz_elasticity law = uz_element_material(model, e)->law;
     const int n = dim * nodes;
+    const bool wide = UZ_CPU_HAS("avx2");
     bool unstrained = model->n_rigid > 0; /* of a rigid group */
     for (int a = 0; a < nodes && unstrained; a++)
         unstrained =
             uz_is_rigid(model, node[a]) && uz_rigid_group_of(model, node[a]) == uz_rigid_group_of(model, node[0]);
-    memset(rows, 0, (size_t)(n * n) * sizeof *rows);
+    memset(rows, 0, (size_t)(n * dim * UZ_ELEMENT_NODES) * sizeof *rows);
     for (int i = 0; i < n; i++)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
     if (w->of->free_strain)
@@ -259,7 +283,7 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
             continue;
         w->energy += weight * at.W;
         add_unit(w, weight, &lame, &x, u);
-        add_point(force, rows, weight, &x, &at);
+        (wide ? add_point_wide : add_point_plain)(force, rows, weight, &x, &at);
     }
     out->unstrained = out->unstrained && 2 * w->small <= OF_ELEMENT * OF_ELEMENT * w->unit;
     w->small += small;
@@ -267,7 +291,7 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     for (int i = 0; i < n && !unstrained; i++) {
         w->force[dim * node[i / dim] + i % dim] += force[i];
         for (int k = 0; k <= i; k++)
-            ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * nodes + k / dim];
+            ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * UZ_ELEMENT_NODES + k / dim];
     }
     if (!unstrained)
         uz_add_stiffness(&w->tangent, ke, node, nodes);

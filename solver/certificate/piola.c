@@ -51,14 +51,15 @@ static void kirchhoff(uz_piola *out, real lambda, real mu, const real F[9], entr
     }
 }
 
-/* The cofactors of F, whose quotient by the determinant is G. Returns the determinant. */
-static real cofactors(real G[9], const real F[9])
+/* The cofactors of F, whose quotient by the determinant is G, where they may be other than 0. Returns the determinant.
+ */
+static real cofactors(real G[9], const real F[9], entries of)
 {
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int a = 3 * ((i + 1) % 3), b = 3 * ((i + 2) % 3), c = (j + 1) % 3, d = (j + 2) % 3;
-            G[3 * i + j] = F[a + c] * F[b + d] - F[a + d] * F[b + c];
-        }
+    for (int p = 0; p < of.n; p++) {
+        const int i = of.at[p] / 3, j = of.at[p] % 3;
+        const int a = 3 * ((i + 1) % 3), b = 3 * ((i + 2) % 3), c = (j + 1) % 3, d = (j + 2) % 3;
+        G[of.at[p]] = F[a + c] * F[b + d] - F[a + d] * F[b + c];
+    }
     return F[0] * G[0] + F[1] * G[1] + F[2] * G[2];
 }
 
@@ -69,14 +70,16 @@ void uz_piola_at(uz_piola *out, uz_elasticity law, real lambda, real mu, const r
         kirchhoff(out, lambda, mu, F, of);
         return;
     }
-    real G[9], I1 = 0;
-    double f[9], g[9];
-    const real J = cofactors(G, F), K = lambda + 2 * mu / 3;
+    real G[9] = {0}, I1 = 0;
+    double f[9], g[9] = {0};
+    const real J = cofactors(G, F, of), K = lambda + 2 * mu / 3;
     for (int i = 0; i < 9; i++) {
-        G[i] /= J;
         I1 += F[i] * F[i];
         f[i] = (double)F[i];
-        g[i] = (double)G[i];
+    }
+    for (int p = 0; p < of.n; p++) {
+        G[of.at[p]] /= J;
+        g[of.at[p]] = (double)G[of.at[p]];
     }
     const bool plain = law == UZ_ELASTIC_NEO_HOOKE;
     const real log_J = plain ? logl(J) : 0, root = plain ? 1 : cbrtl(J), a = mu / (root * root);
