@@ -12,6 +12,7 @@
 #include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "finite/finite_body.h"
 #include "finite/finite_element.h"
 #include "finite/hyperelastic.h"
 
@@ -212,4 +213,22 @@ uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_mod
     free(x.moved);
     free(place);
     return status;
+}
+
+uz_status uz_finite_distance(double *half, const uz_body_model *model, const double *free_strain, const double *from,
+                             const double *to, uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    double *force = uz_alloc(2 * n, sizeof *force);
+    uz_finite_measure there, before;
+    *half = 0;
+    if (!force)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare the answers of two meshes");
+    uz_finite_body(&there, force, NULL, model, free_strain, to, NULL);
+    uz_finite_body(&before, force + n, NULL, model, free_strain, from, NULL);
+    for (int64_t i = 0; i < n && there.least_det > 0 && before.least_det > 0; i++)
+        *half += 0.5 * (to[i] - from[i]) * (force[i] - force[n + i]);
+    *half = fmax(0, *half);
+    free(force);
+    return UZ_OK;
 }

@@ -19,4 +19,11 @@ uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model 
 uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
                                  const double *u, const double *z, double own, double times, uz_error *err);
 
+/* *half: half the work of the change of internal forces on the way from one displacement (n_nodes x dim) to another,
+ * springs with it: about half the square of their distance in the norm of the tangent, however the body stands, as what
+ * is released on the way to an equilibrium. Of small strain, which rotations add to, it would be another one. 0 where
+ * elements are inverted at either. UZ_ERR_MEMORY. */
+uz_status uz_finite_distance(double *half, const uz_body_model *model, const double *free_strain, const double *from,
+                             const double *to, uz_error *err);
+
 #endif

@@ -385,33 +385,9 @@ static bool is_nested(const uz_body_model *body)
     return nested;
 }
 
-/* Of large deformation: half the work of the change of internal forces along the way z between two places, which is
- * about half of z'K z on the tangent, however the body stands; of small strain, R z has another one than z. from, z
- * (n): from + z is the answer's. 0 where elements of the coarser one are inverted on this mesh. */
-static uz_status measure_large_move(double *moved, const uz_scene *scene, const uz_body_model *body, const double *to,
-                                    const double *from, const double *z, uz_error *err)
-{
-    const int64_t n = body->mesh.n_nodes * body->mesh.dim;
-    double *force = uz_alloc(2 * n, sizeof *force), *free_strain = NULL;
-    uz_finite_measure there, before;
-    uz_status status = force ? uz_free_strains(&free_strain, body, scene, err)
-                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare the answers of two grids");
-    *moved = 0;
-    if (status == UZ_OK) {
-        uz_finite_body(&there, force, NULL, body, free_strain, to, NULL);
-        uz_finite_body(&before, force + n, NULL, body, free_strain, from, NULL);
-        for (int64_t i = 0; i < n && there.least_det > 0 && before.least_det > 0; i++)
-            *moved += 0.5 * z[i] * (force[i] - force[n + i]);
-        *moved = fmax(0, *moved);
-    }
-    free(force);
-    free(free_strain);
-    return status;
-}
-
 /* Half the square of the distance of an answer from that of a coarser grid. */
-static uz_status measure_move(double *moved, const uz_scene *scene, const uz_result *here, const uz_result *coarse,
-                              const uz_body_model *body, uz_error *err)
+static uz_status measure_move(double *moved, const uz_result *here, const uz_result *coarse, const uz_body_model *body,
+                              uz_error *err)
 {
     const int64_t n = body->mesh.n_nodes * body->mesh.dim;
     double *from = uz_carry_nodal(&body->mesh, coarse->u, coarse->n_nodes, body->mesh.dim), *z = uz_alloc(n, sizeof *z);
@@ -420,7 +396,7 @@ static uz_status measure_move(double *moved, const uz_scene *scene, const uz_res
     for (int64_t i = 0; i < n && status == UZ_OK; i++)
         z[i] = here->u[i] - from[i];
     if (status == UZ_OK)
-        status = is_large(&here->summary) ? measure_large_move(moved, scene, body, here->u, from, z, err)
+        status = is_large(&here->summary) ? uz_finite_distance(moved, body, here->free_strain, from, here->u, err)
                                           : uz_strain_energy(moved, body, z, false, err);
     free(from);
     free(z);
@@ -446,8 +422,7 @@ static uz_status take_hidden(uz_result *result, search *g, int64_t i, const uz_b
     if (!g->refines || !g->best.results || isnan(now->missed) || isnan(all[g->best.number].missed) || !is_nested(body))
         return UZ_OK;
     uz_result *best = g->best.results[i];
-    const uz_problem one = uz_problem_of_case(g->problem, i);
-    const uz_status status = measure_move(&now->moved, &one.scene, result, best, body, err);
+    const uz_status status = measure_move(&now->moved, result, best, body, err);
     if (status != UZ_OK)
         return status;
     now->from = g->best.number;
