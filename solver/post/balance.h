@@ -40,6 +40,8 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
 void uz_doubt_interpenetration(uz_evaluation *out, const uz_interpenetration *passed, int dim, double load);
 /* Of an answer whose mesh is told to be off by more than was known then: coarse_mesh tells as much. */
 void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error);
+/* The same of one that does not bear the whole load once its elements are divided. */
+void uz_doubt_unborne(uz_evaluation *out);
 /* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the
  * strains, by the energy norm; stress that turns with the body, along u; strains and rotations in the law itself,
  * weighted by the energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends,

@@ -604,19 +604,35 @@ static void look_at_stabilizer(const doubts *d)
          d->scene->stabilizer, part, part > MOST_STABILIZED ? "; hold what is pushed where nothing holds it" : "");
 }
 
-void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
+/* In place of the one that there is. */
+static void warn_of_mesh(uz_evaluation *out, double mesh_error, const char *text)
 {
     const int n = out->n_warnings;
     int at = 0;
     while (at < n && strcmp(out->warnings[at].code, "coarse_mesh") != 0)
         at++;
+    out->n_warnings = at;
+    warn(out, "coarse_mesh", mesh_error, "%s", text);
+    out->n_warnings = at < n ? n : out->n_warnings;
+}
+
+void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
+{
+    char text[sizeof out->warnings[0].message];
     if (!(mesh_error >= COARSE_MESH) || !isfinite(mesh_error))
         return;
-    out->n_warnings = at; /* in place of the one that there is */
-    warn(out, "coarse_mesh", mesh_error,
-         "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and corners",
-         100 * mesh_error);
-    out->n_warnings = at < n ? n : out->n_warnings;
+    snprintf(text, sizeof text,
+             "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and "
+             "corners",
+             100 * mesh_error);
+    warn_of_mesh(out, mesh_error, text);
+}
+
+void uz_doubt_unborne(uz_evaluation *out)
+{
+    warn_of_mesh(out, 1,
+                 "the same mesh with all elements divided has no stable answer under the whole load, so that nothing "
+                 "says how far off this one is: refine it");
 }
 
 static void look_at_mesh(const doubts *d)

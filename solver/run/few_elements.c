@@ -9,7 +9,8 @@
  *
  * Meshes of the standard formulation are nested, so that this is what the square of the error falls by (Galerkin
  * orthogonality), and what it falls to the finer mesh's estimate tells: that is looked at likewise while it has few
- * elements itself. Strains of other formulations are compared as they are. */
+ * elements itself. Strains of other formulations are compared as they are. Of large deformation the finer mesh begins
+ * at the answer, and the distance is what the change of internal forces does along the way (finite/mesh_error.h). */
 #include "run/solve.h"
 
 #include "assembly/assembly.h"
@@ -18,7 +19,9 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "element/element.h"
+#include "finite/mesh_error.h"
 #include "post/balance.h"
+#include "run/finite.h"
 #include "run/problem.h"
 #include "run/results.h"
 #include "run/settings.h"
@@ -28,6 +31,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,6 +54,10 @@ enum { MOST_PLANE = 512, MOST_SOLID = 160 };
 
 /* How far outside of the box of its nodes an element is looked at, in parts of the box. */
 #define AROUND 0.1
+
+/* Of large deformation: where the finer mesh does not go on from the answer under the whole load, that is put on in
+ * parts from rest, but how much of it is borne in the end is not looked for: answers of the finer mesh are not told. */
+#define LEAST_PART (1.0 / 16)
 
 /* A mesh of the answers, and the other one with all elements divided. */
 typedef struct {
@@ -156,26 +164,42 @@ static double distance2_in(const finer *f, const strained *part, const strained 
     return sum;
 }
 
-/* *square: of the distance of the two answers in the energy norm; NaN where a part of an element is not found in it. */
-static uz_status measure_distance(double *square, const finer *f, const double *u, const double *finer_u, uz_error *err)
+/* The square of the distance of two answers of small deformation, the coarser one also as carried to the nodes of the
+ * finer mesh; NaN where a part of an element is not found in it. */
+static double distance2(const finer *f, const double *u, const double *carried, const double *finer_u)
 {
     const uz_mesh *mesh = &f->fine.mesh;
-    double *carried = uz_carry_nodal(mesh, u, f->coarse.mesh.n_nodes, mesh->dim);
-    if (!carried)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare the answers of two meshes");
-    *square = 0;
+    double square = 0;
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && f->fine.spring; i++)
-        *square += f->fine.spring[i] * (finer_u[i] - carried[i]) * (finer_u[i] - carried[i]);
-    free(carried);
+        square += f->fine.spring[i] * (finer_u[i] - carried[i]) * (finer_u[i] - carried[i]);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         strained part, whole;
         take_element(&part, &f->fine, finer_u, e);
         const int64_t of = whole_of(f, &part);
         if (of >= 0)
             take_element(&whole, &f->coarse, u, of);
-        *square += of >= 0 ? distance2_in(f, &part, &whole) : (double)NAN;
+        square += of >= 0 ? distance2_in(f, &part, &whole) : (double)NAN;
     }
-    return UZ_OK;
+    return square;
+}
+
+/* *square: of the distance of the two answers in the energy norm; NaN: it is not known. */
+static uz_status measure_distance(double *square, const finer *f, const uz_result *here, const uz_result *on_finer,
+                                  uz_error *err)
+{
+    const uz_mesh *mesh = &f->fine.mesh;
+    double *carried = uz_carry_nodal(mesh, here->u, f->coarse.mesh.n_nodes, mesh->dim);
+    if (!carried)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare the answers of two meshes");
+    uz_status status = UZ_OK;
+    if (uz_is_finite(&f->problem)) {
+        status = uz_finite_distance(square, &f->fine, on_finer->free_strain, carried, on_finer->u, err);
+        *square *= 2;
+    } else {
+        *square = distance2(f, here->u, carried, on_finer->u);
+    }
+    free(carried);
+    return status;
 }
 
 /* The interval of a quantity has what the finer mesh has, and where the value goes from one to the other. */
@@ -197,21 +221,59 @@ static void widen(uz_quantity_found *q, const uz_quantity_found *on_finer, doubl
     q->mesh = fmax(q->mesh, 0.5 * (high - low) - q->equations);
 }
 
+static bool is_large(const uz_summary *s)
+{
+    return s->geometry.kind == UZ_KINEMATICS_FINITE;
+}
+
+/* Is it under the whole load? */
+static bool is_whole(const uz_summary *s)
+{
+    return !is_large(s) || s->finite.load >= 1;
+}
+
+/* The finer mesh has no answer under the whole load: nothing of this one is more than a number of its mesh. */
+static void take_unborne(uz_result *result)
+{
+    uz_evaluation *e = result->evaluation;
+    result->summary.discretization_error = 1;
+    uz_doubt_unborne(e);
+    for (int64_t i = 0; i < e->n_quantities; i++) {
+        uz_quantity_found *q = &e->quantities[i];
+        q->value = q->found;
+        q->low = q->high = q->mesh = q->equations = NAN;
+        snprintf(q->why, sizeof q->why, "with all elements divided this mesh does not bear the whole load");
+    }
+}
+
+/* Of large deformation: it was looked at, and has no answer under the whole load, or that of its own divided elements
+ * is none. */
+static bool is_unborne(const uz_summary *s)
+{
+    return is_large(s) && (s->outcome == UZ_UNSTABLE || s->outcome == UZ_INVERTED || s->discretization_error >= 1 ||
+                           (s->outcome == UZ_MESH_LIMIT && !is_whole(s)));
+}
+
 static uz_status take_case(uz_result *result, const uz_result *on_finer, const finer *f, uz_error *err)
 {
     uz_summary *s = &result->summary;
     const uz_evaluation *e = result->evaluation, *there = on_finer->evaluation;
+    const bool cut = on_finer->summary.outcome == UZ_MESH_LIMIT && is_large(s); /* by an obstacle, between rows */
     double square = 0;
-    if (on_finer->summary.outcome != UZ_CONVERGED || !there || on_finer->n_nodes != f->fine.mesh.n_nodes)
+    if (is_unborne(&on_finer->summary)) {
+        take_unborne(result);
+        return UZ_OK;
+    }
+    if ((on_finer->summary.outcome != UZ_CONVERGED && !cut) || !there || on_finer->n_nodes != f->fine.mesh.n_nodes)
         return UZ_OK;
     if (s->discretization_error == 0 && on_finer->summary.discretization_error == 0) /* nothing strains that one */
         return UZ_OK;
-    const uz_status status = measure_distance(&square, f, result->u, on_finer->u, err);
+    const uz_status status = measure_distance(&square, f, result, on_finer, err);
     if (status != UZ_OK || !isfinite(square))
         return status;
     const double energy = 2 * e->strain_energy, told = fmin(1, on_finer->summary.discretization_error);
     const double left = 2 * there->strain_energy * told * told / (1 - told * told),
-                 equations = s->certificate.absolute_error;
+                 equations = is_large(s) ? s->finite.residual * sqrt(energy) : s->certificate.absolute_error;
     square = fmax(0, square - equations * equations); /* which is told apart */
     square = fmax(square + left, f->linear ? OF_LINEAR * square : 0);
     if (!isfinite(square) || !(energy + square > 0))
@@ -231,7 +293,7 @@ static bool is_estimated(const uz_result *result, const uz_scene *scene)
     const uz_summary *s = &result->summary;
     const int dim = result->mesh.dim;
     double way = 0, apart = 0;
-    if (!result->evaluation || !result->u || uz_has_no_answer(s) || !isfinite(s->discretization_error))
+    if (!result->evaluation || !result->u || uz_has_no_answer(s) || !isfinite(s->discretization_error) || !is_whole(s))
         return false;
     for (int64_t i = 0; i < result->n_nodes * dim; i++) {
         const double own = fabs(result->u[i]), other = fabs(result->u[i] - result->u[i % dim]);
@@ -286,6 +348,27 @@ static bool are_few(const uz_mesh *mesh)
            (uz_mesh_can_subdivide(mesh) || uz_mesh_check_bisection(mesh, NULL) == UZ_OK);
 }
 
+/* Of large deformation, from where the answers are. */
+static uz_status solve_large(uz_result **there, const finer *f, uz_result *const *results, double started,
+                             uz_error *err)
+{
+    const uz_mesh *mesh = &f->fine.mesh;
+    const int64_t n = f->problem.n_cases > 0 ? f->problem.n_cases : 1;
+    double **near = uz_alloc_zero(n, sizeof *near);
+    bool room = near;
+    for (int64_t i = 0; i < n && room; i++)
+        if (is_estimated(results[i], &f->problem.scene))
+            room = (near[i] = uz_carry_nodal(mesh, results[i]->u, results[i]->n_nodes, mesh->dim));
+    uz_status status = room ? uz_solve_finite_near(there, &f->problem, &f->settings, near, LEAST_PART, &f->hooks, err)
+                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser mesh");
+    if (status == UZ_OK)
+        status = uz_look_at_few_elements(there, &f->problem, &f->settings, NULL, &f->hooks, started, err);
+    for (int64_t i = 0; i < n && near; i++)
+        free(near[i]);
+    free(near);
+    return status;
+}
+
 /* Answers stay as they are where the finer mesh has none: only a lack of memory ends the call. */
 static uz_status look_closer(uz_result **results, finer *f, const uz_problem *problem, uz_cache *cache, uz_error *err)
 {
@@ -294,7 +377,9 @@ static uz_status look_closer(uz_result **results, finer *f, const uz_problem *pr
     uz_result **there = uz_alloc_zero(n, sizeof *there);
     uz_status status =
         there ? divide_all(f, problem, err) : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld cases", (long long)n);
-    if (status == UZ_OK) {
+    if (status == UZ_OK && uz_is_finite(problem))
+        status = solve_large(there, f, results, started, err);
+    else if (status == UZ_OK) {
         status = uz_solve_rounds(there, &f->problem, &f->settings, NULL, NULL, cache, &f->hooks, err);
         status = uz_settle_cases(there, status, &f->problem, &f->settings, NULL, cache, &f->hooks, started, err);
     }

@@ -24,10 +24,8 @@
 
 #define DEGREE (180 / 3.14159265358979323846)
 
-/* Parts are doubled after at most FEW contact problems. The smallest one, of the whole load while none of it is borne.
- */
+/* Parts are doubled after at most FEW contact problems. */
 enum { FEW = 4, MOST_PARTS = 200 };
-#define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
 #define CACHE_BYTES ((size_t)256 << 20)
 /* Contact problems, which are those of all of u, of which most may be rotation, are solved to the first, and the answer
@@ -255,6 +253,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     run->from = path ? path->from : NULL;
     run->near = path && !path->from ? path->near : NULL;
     run->part = path ? path->part : 1;
+    run->least = path && path->least > 0 ? path->least : UZ_LEAST_PART;
     const double start = uz_seconds();
     run->hooks = hooks ? *hooks : (uz_hooks){.ctx = NULL};
     run->hooks.begins = NULL;
@@ -357,10 +356,10 @@ static void measure_overlap(uz_finite_run *run)
     }
 }
 
-/* The load that is borne is known to a thousandth: a part that fails may be twice the least. */
-static double least_part(double load)
+/* The load that is borne is known to run->least: a part that fails may be twice the smallest. */
+static double least_part(const uz_finite_run *run)
 {
-    return LEAST_PART * (load > 0 ? 0.5 * load : 1);
+    return run->least * (run->found.load > 0 ? 0.5 * run->found.load : 1);
 }
 
 /* The way begins at rest, or where another case has come to. */
@@ -433,8 +432,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
         run->stopped = from->stopped;
         step = 0;
     }
-    while (status == UZ_OK && found->load < 1 && step >= least_part(found->load) &&
-           found->steps + found->failed < MOST_PARTS) {
+    while (status == UZ_OK && found->load < 1 && step >= least_part(run) && found->steps + found->failed < MOST_PARTS) {
         uz_part part = UZ_PART_UNSETTLED;
         const double t = fmin(1.0, found->load + step);
         status = run->near ? begin_near(run, err) : put_on(run, t, err);
@@ -544,11 +542,11 @@ static int64_t last_after(const uz_problem *problem, int64_t i)
 
 /* points: n_cases, those that later cases need. */
 static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_problem *problem, int64_t i,
-                            const double *near, const uz_settings *settings, const uz_hooks *hooks, double deadline,
-                            uz_error *err)
+                            const double *near, double least, const uz_settings *settings, const uz_hooks *hooks,
+                            double deadline, uz_error *err)
 {
     const uz_problem one = uz_problem_of_case(problem, i);
-    uz_finite_path path = {.part = 1, .near = near};
+    uz_finite_path path = {.part = 1, .near = near, .least = least};
     if (problem->n_cases == 0)
         return uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
     const uz_load_case *own = &problem->cases[i];
@@ -575,20 +573,23 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
 {
     (void)starts; /* where small deformation has got to says nothing of it */
     (void)cache;  /* tangents are those of one answer */
+    const double started = uz_seconds();
     uz_status status = uz_check_settings(settings, err);
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
     if (status == UZ_OK)
         status = uz_check_finite_settings(settings, err);
     if (status == UZ_OK)
-        status = uz_solve_finite_near(results, problem, settings, NULL, hooks, err);
+        status = uz_solve_finite_near(results, problem, settings, NULL, UZ_LEAST_PART, hooks, err);
+    if (status == UZ_OK)
+        status = uz_look_at_few_elements(results, problem, settings, NULL, hooks, started, err);
     for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1) && status == UZ_OK; i++)
         uz_judge_finite(results[i], problem, settings, hooks);
     return status;
 }
 
 uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                               double *const *near, const uz_hooks *hooks, uz_error *err)
+                               double *const *near, double least, const uz_hooks *hooks, uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
@@ -601,7 +602,8 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
         }
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
-        status = solve_case(&results[i], points, problem, i, near ? near[i] : NULL, settings, hooks, deadline, err);
+        status =
+            solve_case(&results[i], points, problem, i, near ? near[i] : NULL, least, settings, hooks, deadline, err);
     }
     for (int64_t i = 0; i < n && points; i++)
         uz_finite_point_free(points[i]);

@@ -483,8 +483,6 @@ static uz_status solve_small(uz_result **results, const search *g, const uz_prob
         status = uz_solve_rounds(results, problem, settings, from, NULL, g->cache, g->hooks, err);
         status = uz_settle_cases(results, status, problem, settings, from, g->cache, g->hooks, started, err);
     }
-    if (status == UZ_OK && g->refines && !settings->guaranteed && meets(g, results))
-        status = uz_look_at_few_elements(results, problem, settings, g->cache, g->hooks, started, err);
     for (int64_t i = 0; starts && i < g->n_cases; i++)
         uz_state_free(starts[i]);
     free(starts);
@@ -504,7 +502,7 @@ static uz_status solve_large(uz_result **results, const search *g, const uz_prob
             room = (near[i] = g->refines ? uz_carry_nodal(mesh, best->u, best->n_nodes, mesh->dim)
                                          : uz_carry_box(mesh, &g->best.on.box, best->u));
     }
-    uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, g->hooks, err)
+    uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, UZ_LEAST_PART, g->hooks, err)
                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; i < g->n_cases && status == UZ_OK; i++) { /* on one mesh an answer stays without its estimate */
         double *error = &results[i]->summary.discretization_error;
@@ -530,6 +528,8 @@ static uz_status solve_cases(answers *x, uz_grid_level *level, search *g, const 
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the results of %lld cases", (long long)g->n_cases);
     uz_status status = uz_is_finite(problem) ? solve_large(x->results, g, problem, &settings, outline, err)
                                              : solve_small(x->results, g, problem, &settings, outline, started, err);
+    if (status == UZ_OK && g->refines && !settings.guaranteed && meets(g, x->results))
+        status = uz_look_at_few_elements(x->results, problem, &settings, g->cache, g->hooks, started, err);
     for (int64_t i = 0; status == UZ_OK && i < g->n_cases; i++) {
         const uz_summary *s = &x->results[i]->summary;
         seen *known = &g->seen[i * UZ_GRID_LEVELS + g->sequence.count];

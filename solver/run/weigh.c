@@ -169,16 +169,23 @@ static uz_status solve_large(uz_result **large, uz_result *small, const uz_probl
 }
 
 static uz_status choose(uz_result **result, const uz_problem *one, const uz_settings *settings, const uz_hooks *hooks,
-                        double deadline, uz_error *err)
+                        double started, uz_error *err)
 {
+    const double deadline = started + settings->time_limit_s;
     uz_problem finite = *one;
     uz_result *large = NULL, *left;
     finite.scene.kinematics = UZ_KINEMATICS_FINITE;
-    const uz_status status = solve_large(&large, *result, &finite, settings, hooks, deadline, err);
+    uz_status status = solve_large(&large, *result, &finite, settings, hooks, deadline, err);
     if (status != UZ_OK || !large)
         return status;
     const bool enough = large->summary.small.error <= TOLERABLE;
     left = enough ? *result : large;
+    if (!enough)
+        status = uz_look_at_few_elements(&large, &finite, settings, NULL, hooks, started, err);
+    if (status != UZ_OK) {
+        uz_result_free(large);
+        return status;
+    }
     uz_judge_finite(large, one, settings, hooks);
     left->summary.small = large->summary.small;
     count_both(&left->summary, enough ? &large->summary : &(*result)->summary);
@@ -191,7 +198,6 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
                                const uz_hooks *hooks, double started, uz_error *err)
 {
     const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
-    const double deadline = started + settings->time_limit_s;
     const uz_outcome outcome = (*result)->summary.outcome;
     const bool precise = outcome == UZ_PRECISION_LIMIT && (*result)->summary.certificate.relative_error <= COMPARED_TO;
     const bool answered = outcome == UZ_CONVERGED || /* mesh_limit: of a quantity */
@@ -199,8 +205,8 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
     if (!answered || !is_asked(*result, one, own_laws))
         return UZ_OK;
     if (own_laws)
-        return choose(result, one, settings, hooks, deadline, err);
-    return compare_linear(*result, one, hooks, deadline, err);
+        return choose(result, one, settings, hooks, started, err);
+    return compare_linear(*result, one, hooks, started + settings->time_limit_s, err);
 }
 
 /* ---- the kind of run */

@@ -1,6 +1,7 @@
 """Quantities of large deformation: that they become those of small, closed forms, and intervals against finer meshes."""
 # not under ThreadSanitizer: about answers, not about threads
 import copy
+import math
 import pathlib
 import sys
 
@@ -22,6 +23,57 @@ BLOCK = {"problem": {"kind": "scene", "model": "plane_strain", "kinematics": "fi
 def solved(s, request):
     job = s.solved(request, "converged")
     return job["summary"]
+
+
+def few(element, cells, **scene):
+    """A block of a few elements, of one side length each unless said."""
+    size = scene.pop("size", cells)
+    solid = len(cells) == 3
+    return {"problem": {"kind": "scene", "model": "solid" if solid else "plane_strain", "kinematics": "finite", "mesh": {"box": {"size": size, "cells": cells, "element": element}},
+                        "materials": [{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke"}], **scene},
+            "quantities": [{"quantity": "strain_energy"}, {"quantity": "displacement", "on": "right", "direction": [0, 1, 0][:len(cells)]}]}
+
+
+CLAMPED = {"on": "bottom", "ux": 0, "uy": 0}
+FEW = (
+    few("quad4", [1, 1], model="axisymmetric", supports=[CLAMPED], loads=[{"on": "all", "body_force": [0, -0.3]}]),
+    few("quad8", [1, 1], supports=[CLAMPED], loads=[{"on": "all", "body_force": [0.1, -0.2]}]),
+    few("tri3", [4, 1], supports=[{"on": "left", "ux": 0, "uy": 0}], loads=[{"on": "right", "traction": [0, -0.003]}]),
+    few("hex8", [1, 1, 1], supports=[{**CLAMPED, "uz": 0}], loads=[{"on": "all", "body_force": [0, -0.25, 0]}]),
+    few("quad4", [1, 1], kinematics="auto", supports=[CLAMPED], loads=[{"on": "all", "body_force": [0.05, -0.2]}]),
+)
+
+
+def test_few_elements_hide_no_error(s):
+    """Their own estimate was 0 to 0.7 of the error, and true values were out of intervals of no width: they are divided, as under small deformation."""
+    for request in FEW:
+        mine = solved(s, request)
+        fine = copy.deepcopy(request)
+        box = fine["problem"]["mesh"]["box"]
+        solid = len(box["cells"]) == 3
+        fine["problem"]["kinematics"] = "finite"
+        box.update(cells=[(4 if solid else 8) * n for n in box["cells"]], element="hex20" if solid else "quad8")
+        best = solved(s, fine)
+        square = 2 * (mine["energy"]["potential"] - best["energy"]["potential"])
+        true = math.sqrt(square / (2 * mine["energy"]["strain"] + square))
+        check(mine["finite"]["load"] == 1 and 0.95 * true < mine["error"]["mesh"] < 1.3 * true, mine["error"], true, request)
+        for one, other in zip(mine["quantities"], best["quantities"]):
+            check(one["low"] <= other["value"] <= one["high"], one, other, request)
+
+
+def test_few_elements_that_bear_more_than_the_body_say_so(s):
+    """A block on springs beneath one end of its load, of six tetrahedra, and a strip that a pressure bends around: divided they have no answer."""
+    for request in (
+            few("tet4", [1, 1, 1], supports=[{"on": "left", "ux": 0}, {"on": "back", "uz": 0}, {"on": "bottom", "spring": [0.05, 1.05, 0]}],
+                loads=[{"on": "top", "traction": [0.05, -0.161, 0]}], materials=[{"on": "all", "young": 1, "poisson": 0.45, "law": "st_venant_kirchhoff"}]),
+            few("quad8", [2, 1], model="plane_stress", supports=[{"on": "left", "ux": 0, "uy": 0}], loads=[{"on": "top", "pressure": -0.064}],
+                materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke_isochoric"}])):
+        mine = solved(s, request)
+        check(mine["error"]["mesh"] == 1, mine["error"])
+        check(any(one["code"] == "coarse_mesh" and "divided" in one["message"] for one in mine["warnings"]), mine["warnings"])
+        check(all(one["low"] is None and "divided" in one["why"] for one in mine["quantities"]), mine["quantities"])
+        asked = s.solved({**request, "solver": {"accuracy": {"total": 0.9}}}, "mesh_limit")["summary"]
+        check("refine" in asked["message"], asked["message"])
 
 
 def test_uniform_states_have_exact_quantities(s):
