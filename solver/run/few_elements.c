@@ -312,7 +312,7 @@ static uz_status divide_all(finer *f, const uz_problem *problem, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to divide %lld elements", (long long)n);
     if (at > 0)
         memcpy(f->list, problem->scene.bisected, (size_t)at * sizeof *f->list);
-    else if (uz_mesh_can_subdivide(&f->coarse.mesh))
+    else if (uz_mesh_can_subdivide_all(&f->coarse.mesh))
         f->list[at++] = UZ_SUBDIVIDED;
     f->list[at++] = n;
     for (int64_t e = 0; e < n; e++)
@@ -345,7 +345,7 @@ static bool are_few(const uz_mesh *mesh)
         count += wide < 1 ? wide : 1;
     }
     return mesh->n_nodes <= (mesh->dim == 2 ? MOST_PLANE : MOST_SOLID) && count < few &&
-           (uz_mesh_can_subdivide(mesh) || uz_mesh_check_bisection(mesh, NULL) == UZ_OK);
+           (uz_mesh_can_subdivide_all(mesh) || uz_mesh_check_bisection(mesh, NULL) == UZ_OK);
 }
 
 /* Of large deformation, from where the answers are. */

@@ -33,7 +33,8 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
 
 /* Where a mesh has few elements, of which estimates may be worth nothing: what answers are told to be off by, and
  * intervals of their quantities, are no less than what the same mesh with all elements divided tells (few_elements.c).
- * Of meshes that are refined this is for those that would do. Wedges are not divided. UZ_ERR_MEMORY. */
+ * Of meshes that are refined this is for those that would do. Wedges beside other elements are not divided.
+ * UZ_ERR_MEMORY. */
 uz_status uz_look_at_few_elements(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                                   uz_cache *cache, const uz_hooks *hooks, double started, uz_error *err);
 

@@ -1,4 +1,5 @@
-/* subdivide.c: local refinement of quadrilaterals and hexahedra into 4 or 8 of their kind.
+/* subdivide.c: local refinement of quadrilaterals and hexahedra into 4 or 8 of their kind; of wedges into 8, all of
+ * them at once.
  *
  * Beside a divided element an undivided one keeps its whole edges and faces, and the nodes that lie amid them hang:
  * what the whole one's shape functions say there is where they go, which keeps displacements continuous. An element is
@@ -19,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NODES = UZ_ELEMENT_NODES, SIDES = UZ_ELEMENT_SIDES };
+enum { NODES = UZ_ELEMENT_NODES, SIDES = UZ_ELEMENT_SIDES, WEDGE = 6 };
 
 /* A part of an element that was given, its root: the whole of it at first. */
 typedef struct {
@@ -41,25 +42,34 @@ static bool begin(subdivision *x, uz_mesh *mesh);
 static void divide(subdivision *x, int64_t e);
 static void publish(subdivision *x);
 
+static bool is_of_one(const uz_mesh *mesh, int corners)
+{
+    bool one = uz_element_type_of((uz_element_kind)mesh->kind[0])->corners == corners;
+    for (int64_t e = 1; e < mesh->n_elements && one; e++)
+        one = mesh->kind[e] == mesh->kind[0];
+    return one;
+}
+
 bool uz_mesh_can_subdivide(const uz_mesh *mesh)
 {
-    const int corners = uz_element_type_of((uz_element_kind)mesh->kind[0])->corners;
-    bool can = corners == 1 << mesh->dim;
-    for (int64_t e = 1; e < mesh->n_elements && can; e++)
-        can = mesh->kind[e] == mesh->kind[0];
-    return can;
+    return is_of_one(mesh, 1 << mesh->dim);
+}
+
+bool uz_mesh_can_subdivide_all(const uz_mesh *mesh)
+{
+    return uz_mesh_can_subdivide(mesh) || is_of_one(mesh, WEDGE);
 }
 
 uz_status uz_mesh_subdivide(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_error *err)
 {
     subdivision x = {.count = 0};
-    if (!uz_mesh_can_subdivide(mesh))
+    if (!uz_mesh_can_subdivide_all(mesh))
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/refine",
-                       "only meshes of quadrilaterals or hexahedra of one type can be subdivided");
+                       "only meshes of quadrilaterals, hexahedra or wedges of one type can be subdivided");
     bool listed = n > 0 && marked[0] == UZ_SUBDIVIDED;
     x.all.failed = !begin(&x, mesh);
     for (int64_t i = 1; i < n && listed && !x.all.failed && !x.all.too_many; i += 1 + marked[i]) {
-        listed = marked[i] >= 0 && marked[i] < n - i;
+        listed = marked[i] >= 0 && marked[i] < n - i && (x.type->corners != WEDGE || marked[i] == x.count);
         for (int64_t k = i + 1; listed && k <= i + marked[i]; k++) {
             listed = marked[k] >= 0 && marked[k] < x.count;
             if (listed)
@@ -82,12 +92,14 @@ static int64_t edge_of(subdivision *x, const int64_t *node, int k)
     return uz_refinement_link(&x->all, (int64_t[2]){node[x->edge[k][0]], node[x->edge[k][1]]}, 2);
 }
 
-/* Of a hexahedron. */
+/* Of a hexahedron or a wedge. */
 static int64_t face_of(subdivision *x, const int64_t *node, int s)
 {
     const uz_element_side *side = &x->type->side[s];
-    return uz_refinement_link(
-        &x->all, (int64_t[4]){node[side->node[0]], node[side->node[1]], node[side->node[2]], node[side->node[3]]}, 4);
+    int64_t corner[UZ_LINK_NODES];
+    for (int k = 0; k < side->corners; k++)
+        corner[k] = node[side->node[k]];
+    return uz_refinement_link(&x->all, corner, side->corners);
 }
 
 static int faces(const subdivision *x)
@@ -128,7 +140,9 @@ static void list_links(subdivision *x, int64_t e)
 static bool begin(subdivision *x, uz_mesh *mesh)
 {
     x->type = uz_element_type_of((uz_element_kind)mesh->kind[0]);
-    const uz_element_type *edged = uz_element_type_of(mesh->dim == 2 ? UZ_QUAD8 : UZ_HEX20);
+    const uz_element_type *edged = uz_element_type_of(mesh->dim == 2              ? UZ_QUAD8
+                                                      : x->type->corners == WEDGE ? UZ_WEDGE15
+                                                                                  : UZ_HEX20);
     x->edge = edged->edge;
     x->edges = edged->nodes - edged->corners;
     x->count = x->room = mesh->n_elements;
@@ -159,9 +173,26 @@ static void divide_whole(subdivision *x, int64_t link)
     }
 }
 
-/* The node at the place of a local node of the part of an element at one of its corners. `part` has those before it;
- * *centre: the node amid the element, -1: not made yet. */
-static int64_t node_of_part(subdivision *x, const int64_t *node, int corner, int local, const int64_t *part,
+/* The parts of an element are one at each corner, half as large, in its order, and of a wedge one between those at the
+ * corners of either triangle, turned by half a turn. The first corner of the element on the side where a part is: */
+static int beside(const uz_element_type *type, int part)
+{
+    return part < type->corners ? part : 3 * (part - type->corners);
+}
+
+/* Does the side of a part lie in the same side of the element? */
+static bool is_in_side(const uz_element_type *type, int part, int s)
+{
+    const int at = beside(type, part);
+    bool in = false;
+    for (int k = 0; k < type->side[s].corners; k++)
+        in = in || type->side[s].node[k] == at;
+    return in && (part < type->corners || type->side[s].corners == 3);
+}
+
+/* The node at the place of a local node of a part of an element. `part` has those before it; *centre: the node amid the
+ * element, -1: not made yet. */
+static int64_t node_of_part(subdivision *x, const int64_t *node, int which, int local, const int64_t *part,
                             int64_t *centre)
 {
     const uz_element_type *type = x->type;
@@ -169,7 +200,8 @@ static int64_t node_of_part(subdivision *x, const int64_t *node, int corner, int
     int64_t from[NODES], *known = NULL, made;
     int count = 0, corners = 0;
     for (int c = 0; c < type->dim; c++)
-        point[c] = 0.5 * (type->local[local][c] + type->local[corner][c]);
+        point[c] = which < type->corners || c == 2 ? 0.5 * (type->local[local][c] + type->local[beside(type, which)][c])
+                                                   : 0.5 * (1 - type->local[local][c]);
     type->shape(type, N, NULL, point);
     for (int a = 0; a < type->nodes; a++) { /* all of these are sums of powers of 2: zeros are exact */
         if (N[a] == 0)
@@ -204,22 +236,20 @@ static void divide(subdivision *x, int64_t e)
         divide_whole(x, edge[k] = edge_of(x, whole.node, k));
     for (int s = 0; s < faces(x); s++)
         divide_whole(x, face[s] = face_of(x, whole.node, s));
-    for (int corner = 0; corner < type->corners && !x->all.failed && !x->all.too_many; corner++) {
-        const int64_t at = corner == 0 ? e : x->count;
+    for (int p = 0; p < 1 << type->dim && !x->all.failed && !x->all.too_many; p++) {
+        const int64_t at = p == 0 ? e : x->count;
         cell part = {.root = whole.root};
         for (int k = 0; k < type->nodes; k++)
-            part.node[k] = node_of_part(x, whole.node, corner, k, part.node, &centre);
+            part.node[k] = node_of_part(x, whole.node, p, k, part.node, &centre);
         for (int s = 0; s < type->sides; s++) {
-            bool on = false;
-            for (int k = 0; k < type->side[s].corners; k++)
-                on = on || type->side[s].node[k] == corner;
+            const bool on = is_in_side(type, p, s);
             part.side[s] = on ? whole.side[s] : (signed char)-1;
             const int64_t link = on && type->dim == 3 ? face_of(x, part.node, s) : -1;
             if (link >= 0 && !x->all.failed)
                 x->all.links[link].whole = face[s];
         }
         for (int k = 0; k < x->edges; k++) {
-            const bool on = x->edge[k][0] == corner || x->edge[k][1] == corner;
+            const bool on = x->edge[k][0] == p || x->edge[k][1] == p; /* of parts amid others none is */
             const int64_t link = on ? edge_of(x, part.node, k) : -1;
             if (link >= 0 && !x->all.failed)
                 x->all.links[link].whole = edge[k];

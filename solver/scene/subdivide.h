@@ -1,4 +1,4 @@
-/* subdivide.h: finer quadrilaterals and hexahedra where they are asked for, with hanging nodes. */
+/* subdivide.h: finer quadrilaterals and hexahedra where they are asked for, with hanging nodes; wedges everywhere. */
 #ifndef UZ_SCENE_SUBDIVIDE_H
 #define UZ_SCENE_SUBDIVIDE_H
 
@@ -9,6 +9,9 @@ enum { UZ_SUBDIVIDED = -1 };
 
 /* Are all elements quadrilaterals, or all hexahedra, and of one type? */
 bool uz_mesh_can_subdivide(const uz_mesh *mesh);
+
+/* Likewise, or are all elements wedges of one type? Those are only divided all at once. */
+bool uz_mesh_can_subdivide_all(const uz_mesh *mesh);
 
 /* Divides elements of such a mesh into 4 or 8 of their type, round after round: after UZ_SUBDIVIDED marked[1..n) has
  * for each round how many, then which, by their numbers after the rounds before; and with them as many coarser ones as

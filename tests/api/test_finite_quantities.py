@@ -40,6 +40,7 @@ FEW = (
     few("quad8", [1, 1], supports=[CLAMPED], loads=[{"on": "all", "body_force": [0.1, -0.2]}]),
     few("tri3", [4, 1], supports=[{"on": "left", "ux": 0, "uy": 0}], loads=[{"on": "right", "traction": [0, -0.003]}]),
     few("hex8", [1, 1, 1], supports=[{**CLAMPED, "uz": 0}], loads=[{"on": "all", "body_force": [0, -0.25, 0]}]),
+    few("wedge6", [1, 1, 1], supports=[{**CLAMPED, "uz": 0}], loads=[{"on": "all", "body_force": [0, -0.25, 0]}]),
     few("quad4", [1, 1], kinematics="auto", supports=[CLAMPED], loads=[{"on": "all", "body_force": [0.05, -0.2]}]),
 )
 

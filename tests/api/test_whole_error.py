@@ -268,6 +268,19 @@ def test_nodes_that_no_load_moves_hide_nothing(s):
         check(mine["error"]["mesh"] == 1 and mine["quantities"][0]["high"] > best["energy"]["strain"] > 5e-4, mine["error"], mine["quantities"])
 
 
+def test_a_few_wedges_hide_no_error(s):
+    """Two of them were told 0.5 to 0.6 of their error, and the strain energy was out of its interval."""
+    for element, size, cells, force in (("wedge6", [1, 1, 1], [1, 1, 1], [0, -0.2, 0]), ("wedge15", [2, 1, 1], [2, 1, 1], [0.1, -0.2, 0])):
+        problem = {"kind": "scene", "model": "solid", "kinematics": "fixed", "materials": [{"on": "all", "young": 1, "poisson": 0.3}],
+                   "supports": [{"on": "bottom", "ux": 0, "uy": 0, "uz": 0}], "loads": [{"on": "all", "body_force": force}]}
+        mine, best = (solved(s, {"problem": {**problem, "mesh": {"box": {"size": size, "cells": n, "element": kind}}}, "quantities": [{"quantity": "strain_energy"}]})["summary"]
+                      for kind, n in ((element, cells), ("hex20", [6 * n for n in cells])))
+        lost = mine["energy"]["potential"] - best["energy"]["potential"]
+        true = math.sqrt(lost / (mine["energy"]["strain"] + lost))
+        check(0.9 * true < mine["error"]["mesh"] < 1.3 * true, mine["error"], true, element)
+        check(mine["quantities"][0]["low"] <= best["energy"]["strain"] <= mine["quantities"][0]["high"], mine["quantities"], best["energy"])
+
+
 def test_what_few_elements_are_told_does_not_depend_on_their_numbers(s):
     """Of two formulations the last element's counted for all: 0.238 one way round, 0.260 the other."""
     wide, high, told = 10, 5, []

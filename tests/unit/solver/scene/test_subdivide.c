@@ -1,5 +1,5 @@
-/* Subdivision of quadrilaterals and hexahedra: what hangs is interpolated, functions stay continuous, levels are
- * balanced, groups are inherited. */
+/* Subdivision of quadrilaterals, hexahedra and wedges: what hangs is interpolated, functions stay continuous, levels
+ * are balanced, groups are inherited. */
 #include "element/element.h"
 #include "harness.h"
 #include "scene/subdivide.h"
@@ -8,14 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { X, Y, Z, MANY = 4 };
-static const char *const KINDS[MANY] = {"quad4", "quad8", "hex8", "hex20"};
+enum { X, Y, Z, MANY = 4, ALL = 6 };
+/* The first of which may be divided one by one. */
+static const char *const KINDS[ALL] = {"quad4", "quad8", "hex8", "hex20", "wedge6", "wedge15"};
 
 static uz_mesh mesh_of(const char *element, int64_t cells)
 {
     uz_box box = {.size = {3, 2, 1.5}, .cells = {cells, cells, cells}, .grading = {1, 1, 1}};
     snprintf(box.element, sizeof box.element, "%s", element);
-    box.dim = element[0] == 'h' ? 3 : 2;
+    box.dim = element[0] == 'q' || element[0] == 't' ? 2 : 3;
     uz_mesh mesh;
     CHECK_INT(uz_mesh_from_box(&mesh, &box, NULL), UZ_OK);
     return mesh;
@@ -261,16 +262,31 @@ TEST(nothing_hangs_on_what_hangs)
     }
 }
 
+/* Twice; elements and sides have the sizes of those, and sides of the box as many nodes. */
 TEST(all_elements_of_a_box_become_those_of_a_finer_one)
 {
-    for (size_t k = 0; k < MANY; k++) {
-        uz_mesh fine = mesh_of(KINDS[k], 2), finer = mesh_of(KINDS[k], 4);
+    static const char *const NAMES[] = {"left", "right", "bottom", "top", "back", "front"};
+    for (size_t k = 0; k < ALL; k++) {
+        uz_mesh fine = mesh_of(KINDS[k], 1), finer = mesh_of(KINDS[k], 4);
+        const int parts = 1 << fine.dim;
         list *all = new_list();
-        all->value[all->count++] = fine.n_elements;
-        for (int64_t e = 0; e < fine.n_elements; e++)
-            all->value[all->count++] = e;
+        for (int64_t n = fine.n_elements, round = 0; round < 2; round++, n *= parts) {
+            all->value[all->count++] = n;
+            for (int64_t e = 0; e < n; e++)
+                all->value[all->count++] = e;
+        }
+        CHECK(uz_mesh_can_subdivide_all(&fine));
         CHECK_INT(uz_mesh_subdivide(&fine, all->value, all->count, NULL), UZ_OK);
         CHECK(fine.n_elements == finer.n_elements && fine.n_nodes == finer.n_nodes && !fine.hangs);
+        for (int64_t e = 0; e < fine.n_elements; e++)
+            CHECK_REL(volume_of(&fine, e), volume_of(&finer, 0), 1e-12);
+        for (int s = 0; s < 2 * fine.dim; s++) {
+            const uz_group *mine = uz_mesh_group(&fine, NAMES[s], "", NULL),
+                           *other = uz_mesh_group(&finer, NAMES[s], "", NULL);
+            CHECK(mine->n_faces == other->n_faces && mine->n_nodes == other->n_nodes);
+            for (int64_t i = 0; i < mine->n_faces; i++)
+                CHECK_REL(area_of(&fine, mine->face[i]), area_of(&finer, other->face[0]), 1e-12);
+        }
         uz_mesh_clear(&fine);
         uz_mesh_clear(&finer);
         free(all);
@@ -401,8 +417,11 @@ TEST(lists_that_are_none_are_refused)
         CHECK_INT(uz_mesh_subdivide(&mesh, LISTS[k], 3, &err), UZ_ERR_ARGUMENT);
         uz_mesh_clear(&mesh);
     }
-    uz_mesh mesh = mesh_of("tri3", 2);
+    uz_mesh mesh = mesh_of("tri3", 2), wedges = mesh_of("wedge6", 1);
     uz_error err = {0};
     CHECK_INT(uz_mesh_subdivide(&mesh, LISTS[0], 3, &err), UZ_ERR_SCENE);
+    CHECK_INT(uz_mesh_subdivide(&wedges, (int64_t[]){UZ_SUBDIVIDED, 1, 0}, 3, &err), UZ_ERR_ARGUMENT); /* all or none */
+    CHECK(!uz_mesh_can_subdivide(&wedges));
     uz_mesh_clear(&mesh);
+    uz_mesh_clear(&wedges);
 }
