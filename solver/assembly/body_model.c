@@ -100,6 +100,7 @@ size_t uz_body_model_bytes(const uz_body_model *model)
             8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
         const size_t new = mesh->from_first ? nodes - (size_t)mesh->n_given : 0;
         bytes += new > 0 ? 8 * (new + 1) + 16 * (size_t)mesh->from_first[new] : 0;
+        bytes += mesh->part_of ? elements * sizeof *mesh->part_of : 0;
         bytes += mesh->hangs ? nodes + elements : 0;
         bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim);
         bytes += (size_t)model->d * (size_t)model->n_modes * 8;

@@ -52,9 +52,6 @@ enum { MOST_PLANE = 512, MOST_SOLID = 160 };
 /* Displacements that differ by less, in parts of the largest, may have lost digits that count. */
 #define ALIKE 1e-6
 
-/* How far outside of the box of its nodes an element is looked at, in parts of the box. */
-#define AROUND 0.1
-
 /* Of large deformation: where the finer mesh does not go on from the answer under the whole load, that is put on in
  * parts from rest, but how much of it is borne in the end is not looked for: answers of the finer mesh are not told. */
 #define LEAST_PART (1.0 / 16)
@@ -98,41 +95,6 @@ static void take_element(strained *out, const uz_body_model *model, const double
     uz_element_move(&out->motion, &out->element, out->u);
 }
 
-static bool is_around(const double *xyz, int nodes, int dim, const double x[3])
-{
-    bool around = true;
-    for (int c = 0; c < dim; c++) {
-        double low = INFINITY, high = -INFINITY;
-        for (int a = 0; a < nodes; a++) {
-            low = fmin(low, xyz[a * dim + c]);
-            high = fmax(high, xyz[a * dim + c]);
-        }
-        around = around && x[c] >= low - AROUND * (high - low) && x[c] <= high + AROUND * (high - low);
-    }
-    return around;
-}
-
-/* The element of the coarser mesh that one of the finer mesh is part of: in which its middle is deepest. -1: none. */
-static int64_t whole_of(const finer *f, const strained *part)
-{
-    const int dim = f->coarse.mesh.dim, corners = uz_element_type_of(part->element.kind)->corners;
-    double middle[3] = {0}, deepest = -INFINITY;
-    int64_t found = -1;
-    for (int i = 0; i < corners * dim; i++)
-        middle[i % dim] += part->xyz[i] / corners;
-    for (int64_t e = 0; e < f->coarse.mesh.n_elements; e++) {
-        const uz_element_type *type = uz_element_type_of((uz_element_kind)f->coarse.mesh.kind[e]);
-        double xyz[3 * UZ_ELEMENT_NODES], point[3];
-        const int nodes = take_places(xyz, &f->coarse.mesh, e);
-        if (!is_around(xyz, nodes, dim, middle) || !uz_element_find(point, type, xyz, f->coarse.mesh.extent, middle))
-            continue;
-        const double depth = uz_element_depth(type, point);
-        found = depth > deepest ? e : found;
-        deepest = fmax(depth, deepest);
-    }
-    return found;
-}
-
 /* The energy of what both strains differ by in a part of an element, twice. */
 static double distance2_in(const finer *f, const strained *part, const strained *whole)
 {
@@ -165,7 +127,7 @@ static double distance2_in(const finer *f, const strained *part, const strained 
 }
 
 /* The square of the distance of two answers of small deformation, the coarser one also as carried to the nodes of the
- * finer mesh; NaN where a part of an element is not found in it. */
+ * finer mesh; NaN where a place of a part is not found in the whole. */
 static double distance2(const finer *f, const double *u, const double *carried, const double *finer_u)
 {
     const uz_mesh *mesh = &f->fine.mesh;
@@ -175,10 +137,8 @@ static double distance2(const finer *f, const double *u, const double *carried, 
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         strained part, whole;
         take_element(&part, &f->fine, finer_u, e);
-        const int64_t of = whole_of(f, &part);
-        if (of >= 0)
-            take_element(&whole, &f->coarse, u, of);
-        square += of >= 0 ? distance2_in(f, &part, &whole) : (double)NAN;
+        take_element(&whole, &f->coarse, u, mesh->part_of[e]);
+        square += distance2_in(f, &part, &whole);
     }
     return square;
 }

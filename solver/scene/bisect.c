@@ -26,7 +26,7 @@ enum { CORNERS = 4, FROM = 8 };
 
 /* A part of an element that was given, its root: the whole of it at first. Sets of corners are bits. */
 typedef struct {
-    int64_t corner[CORNERS], root;
+    int64_t corner[CORNERS], root, part_of; /* part_of: of the elements before this round */
     int corners;
     bool quadratic;              /* its root has nodes amid its edges */
     unsigned char split;         /* ends of the edge that is halved next */
@@ -76,6 +76,8 @@ uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_err
         const bool once = marked[i] == UZ_HALVED_ONCE && i + 1 < n;
         i += once;
         listed = marked[i] >= 0 && marked[i] < n - i;
+        for (int64_t e = 0; e < x.parts; e++)
+            x.part[e].part_of = e;
         for (int64_t k = i + 1; listed && k <= i + marked[i]; k++) {
             listed = marked[k] >= 0 && marked[k] < x.parts;
             if (!listed)
@@ -244,7 +246,8 @@ static void cut(bisection *x, int64_t e)
     for (int k = 0; k < 2; k++) { /* from corner i on, over the next two */
         piece *half = &x->part[k == 0 ? e : x->parts];
         const int next = (i + 1 + k) % 4, last = (i + 2 + k) % 4;
-        *half = (piece){.root = whole.root, .corners = 3, .quadratic = whole.quadratic, .due = whole.due};
+        *half = (piece){
+            .root = whole.root, .part_of = whole.part_of, .corners = 3, .quadratic = whole.quadratic, .due = whole.due};
         half->corner[0] = whole.corner[i];
         half->corner[1] = whole.corner[next];
         half->corner[2] = whole.corner[last];
@@ -365,10 +368,11 @@ static void publish(bisection *x)
     uz_mesh fine = {.n_elements = x->parts,
                     .kind = uz_alloc(x->parts, sizeof *fine.kind),
                     .first = uz_alloc(x->parts + 1, sizeof *fine.first),
-                    .node = uz_alloc(most, sizeof *fine.node)};
+                    .node = uz_alloc(most, sizeof *fine.node),
+                    .part_of = uz_alloc(x->parts, sizeof *fine.part_of)};
     int64_t *root = uz_alloc(x->parts, sizeof *root), q = 0;
     signed char *side_of = uz_alloc(x->parts * UZ_ELEMENT_SIDES, 1);
-    x->all.failed = x->all.failed || !fine.kind || !fine.first || !fine.node || !root || !side_of;
+    x->all.failed = x->all.failed || !fine.kind || !fine.first || !fine.node || !fine.part_of || !root || !side_of;
     for (int64_t e = 0; e < x->parts && !x->all.failed; e++) {
         const piece *part = &x->part[e];
         const uz_element_kind whole = (uz_element_kind)mesh->kind[part->root];
@@ -386,6 +390,7 @@ static void publish(bisection *x)
         }
         fine.first[e + 1] = q;
         root[e] = part->root;
+        fine.part_of[e] = part->part_of;
         for (int s = 0; s < type->sides; s++) {
             int opposite = type->dim == 2 ? 3 : 6; /* the sum of all corners, of which the side has all but one */
             for (int k = 0; k < type->side[s].corners; k++)

@@ -26,6 +26,7 @@ void uz_mesh_clear(uz_mesh *mesh)
     free(mesh->from);
     free(mesh->from_share);
     free(mesh->hangs);
+    free(mesh->part_of);
     free(mesh->inside);
     memset(mesh, 0, sizeof *mesh);
 }

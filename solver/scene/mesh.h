@@ -48,6 +48,7 @@ typedef struct {
     /* Subdivided: n_nodes, nodes that an element which has the edge or face that they lie amid does not have. They go
      * where that goes, and none of those that they lie amid hangs itself. NULL: there are none. */
     unsigned char *hangs;
+    int64_t *part_of;      /* refined: n_elements, the element before the last round that each is part of */
     unsigned char *inside; /* with `hangs`: n_elements, bits of its sides that lie within the body */
     uz_group *groups;
     int64_t n_groups;

@@ -309,6 +309,7 @@ void uz_refinement_publish(uz_refinement *x, uz_mesh *fine, const int64_t *root,
         free(fine->first);
         free(fine->node);
         free(fine->hangs);
+        free(fine->part_of);
         free(fine->inside);
         return;
     }

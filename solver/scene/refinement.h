@@ -46,9 +46,9 @@ int64_t uz_refinement_link(uz_refinement *x, const int64_t *corner, int corners)
 /* Lists an element as one that has the link. */
 void uz_refinement_use(uz_refinement *x, int64_t link, int64_t element);
 
-/* The mesh becomes `fine`, of which kind, first, node and hangs are made, and which takes all else. root: by element of
- * it the one that was given which it is a part of; side: UZ_ELEMENT_SIDES of each, by its own sides, the one of the
- * root's that this is a part of, -1: none. Where x fails, fine is freed and the mesh can only be cleared. */
+/* The mesh becomes `fine`, of which kind, first, node, part_of and hangs are made, and which takes all else. root: by
+ * element of it the one that was given which it is a part of; side: UZ_ELEMENT_SIDES of each, by its own sides, the one
+ * of the root's that this is a part of, -1: none. Where x fails, fine is freed and the mesh can only be cleared. */
 void uz_refinement_publish(uz_refinement *x, uz_mesh *fine, const int64_t *root, const signed char *side);
 
 /* Clears x and tells how it ended; listed: the list named elements that are there. UZ_ERR_ARGUMENT, _LIMIT, _MEMORY. */

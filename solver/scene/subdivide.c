@@ -22,9 +22,9 @@
 
 enum { NODES = UZ_ELEMENT_NODES, SIDES = UZ_ELEMENT_SIDES, WEDGE = 6 };
 
-/* A part of an element that was given, its root: the whole of it at first. */
+/* A part of an element that was given, its root: the whole of it at first; and of one before this round. */
 typedef struct {
-    int64_t node[NODES], root;
+    int64_t node[NODES], root, part_of;
     signed char side[SIDES]; /* the root's that each of its own is part of, -1: none */
     bool due;
 } cell;
@@ -70,6 +70,8 @@ uz_status uz_mesh_subdivide(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_
     x.all.failed = !begin(&x, mesh);
     for (int64_t i = 1; i < n && listed && !x.all.failed && !x.all.too_many; i += 1 + marked[i]) {
         listed = marked[i] >= 0 && marked[i] < n - i && (x.type->corners != WEDGE || marked[i] == x.count);
+        for (int64_t e = 0; e < x.count; e++)
+            x.cells[e].part_of = e;
         for (int64_t k = i + 1; listed && k <= i + marked[i]; k++) {
             listed = marked[k] >= 0 && marked[k] < x.count;
             if (listed)
@@ -238,7 +240,7 @@ static void divide(subdivision *x, int64_t e)
         divide_whole(x, face[s] = face_of(x, whole.node, s));
     for (int p = 0; p < 1 << type->dim && !x->all.failed && !x->all.too_many; p++) {
         const int64_t at = p == 0 ? e : x->count;
-        cell part = {.root = whole.root};
+        cell part = {.root = whole.root, .part_of = whole.part_of};
         for (int k = 0; k < type->nodes; k++)
             part.node[k] = node_of_part(x, whole.node, p, k, part.node, &centre);
         for (int s = 0; s < type->sides; s++) {
@@ -318,16 +320,19 @@ static void publish(subdivision *x)
                     .kind = uz_alloc(x->count, sizeof *fine.kind),
                     .first = uz_alloc(x->count + 1, sizeof *fine.first),
                     .node = uz_alloc(x->count * nodes, sizeof *fine.node),
+                    .part_of = uz_alloc(x->count, sizeof *fine.part_of),
                     .hangs = uz_alloc_zero(x->all.nodes, sizeof *fine.hangs)};
     int64_t *root = uz_alloc(x->count, sizeof *root);
     signed char *side = uz_alloc(x->count * SIDES, sizeof *side);
-    x->all.failed = x->all.failed || !fine.kind || !fine.first || !fine.node || !fine.hangs || !root || !side;
+    x->all.failed =
+        x->all.failed || !fine.kind || !fine.first || !fine.node || !fine.hangs || !fine.part_of || !root || !side;
     for (int64_t e = 0; e < x->count && !x->all.failed; e++) {
         fine.kind[e] = x->all.mesh->kind[0];
         fine.first[e] = e * nodes;
         memcpy(fine.node + e * nodes, x->cells[e].node, (size_t)nodes * sizeof *fine.node);
         fine.first[e + 1] = (e + 1) * nodes;
         root[e] = x->cells[e].root;
+        fine.part_of[e] = x->cells[e].part_of;
         memcpy(side + e * SIDES, x->cells[e].side, SIDES);
     }
     if (!x->all.failed && !mark_hanging(x, fine.hangs)) {
