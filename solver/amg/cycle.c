@@ -31,11 +31,12 @@ static inline __attribute__((always_inline)) void gather(float s[UZ_LANES_MOST][
                                                          const float *x, int64_t i, bool upwards, int b, int lanes)
 {
     const int parts = b > 4 ? 2 : 1;
-    const uz_blocks *A = &level->A;
+    const int64_t first = level->A.ptr[i], end = level->A.ptr[i + 1], size = upwards ? -(int64_t)b * b : (int64_t)b * b;
+    const int32_t *column = level->A.idx + (upwards ? end - 1 : first);
+    const float *block = level->off + (upwards ? end - 1 : first) * b * b;
     four sum[UZ_LANES_MOST][ROWS_MOST] = {{{0}}};
-    for (int64_t k = A->ptr[i]; k < A->ptr[i + 1]; k++) {
-        const int64_t e = upwards ? A->ptr[i] + A->ptr[i + 1] - 1 - k : k;
-        const float *block = level->off + e * b * b, *of = x + (int64_t)A->idx[e] * 4 * parts * lanes;
+    for (int64_t e = first; e < end; e++, block += size, column += upwards ? -1 : 1) {
+        const float *of = x + (int64_t)*column * 4 * parts * lanes;
         for (int q = 0; q < parts; q++)
             for (int l = 0; l < lanes; l++) {
                 const four value = *(const four *)(of + 4 * (l * parts + q));
@@ -53,10 +54,11 @@ static inline __attribute__((always_inline)) void
 scatter(float *t, const uz_level *level, float value[UZ_LANES_MOST][ROWS_MOST], int64_t i, int b, int lanes)
 {
     const int parts = b > 4 ? 2 : 1;
-    const uz_blocks *A = &level->A;
-    for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
-        const float *block = level->off + e * b * b;
-        float *to = t + (int64_t)A->idx[e] * 4 * parts * lanes;
+    const int64_t first = level->A.ptr[i], count = level->A.ptr[i + 1] - first;
+    const int32_t *column = level->A.idx + first, *end = column + count;
+    const float *block = level->off + first * b * b;
+    for (; column < end; column++, block += (int64_t)b * b) {
+        float *to = t + (int64_t)*column * 4 * parts * lanes;
         for (int q = 0; q < parts; q++) {
             four sum[UZ_LANES_MOST];
             for (int l = 0; l < lanes; l++)
@@ -69,6 +71,18 @@ scatter(float *t, const uz_level *level, float value[UZ_LANES_MOST][ROWS_MOST], 
             for (int l = 0; l < lanes; l++)
                 *(four *)(to + 4 * (l * parts + q)) = sum[l];
         }
+    }
+}
+
+/* A node's numbers and the surplus ones: four at a time, as what follows soon reads them so and would else wait until
+ * each number had got to the cache. */
+static inline __attribute__((always_inline)) void store(float *to, const float *value, int b)
+{
+    for (int q = 0; q < uz_width(b); q += 4) {
+        four all = {0};
+        for (int r = q; r < b && r < q + 4; r++)
+            all[r - q] = value[r];
+        *(four *)(to + q) = all;
     }
 }
 
@@ -99,8 +113,7 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
                     s[l][r] -= own[r * b + c] * value[l][c];
                 value[l][r] = inverse[r] * s[l][r];
             }
-            for (int r = 0; r < width; r++)
-                x[r] = r < b ? value[l][r] : 0.0F;
+            store(x, value[l], b);
             for (int r = 0; reduces && r < b; r++) {
                 const int64_t at = (i * lanes + l) * width + r;
                 value[l][r] = step->swept[at] -= step->share[l] * (step->along[at] + value[l][r]);
@@ -110,8 +123,7 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
                 for (int c = r + 1; c < b; c++)
                     left[r] -= own[r * b + c] * value[l][c];
             }
-            for (int r = 0; r < width; r++)
-                t[r] = r < b ? left[r] : 0.0F;
+            store(t, left, b);
             for (int r = 0; r < b; r++)
                 value[l][r] = -value[l][r];
         }
@@ -179,23 +191,33 @@ static inline __attribute__((always_inline)) void restrict_to(const uz_level_ste
 {
     const uz_level *level = step->level;
     const int width = uz_width(b), parts = k > 4 ? 2 : 1, wide = 4 * parts * lanes;
-    memset(step->coarse + of.first * wide, 0, (size_t)((of.end - of.first) * wide) * sizeof *step->coarse);
-    for (int64_t i = 0; i < level->A.nodes; i++)
-        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1] && level->block[e] < of.end; e++) {
-            if (level->block[e] < of.first)
-                continue;
-            const float *P = level->value + e * b * k;
+    const int64_t *ptr = level->ptr;
+    const int32_t *block = level->block;
+    float *coarse = step->coarse;
+    memset(coarse + of.first * wide, 0, (size_t)((of.end - of.first) * wide) * sizeof *coarse);
+    for (int64_t i = 0; i < level->A.nodes; i++) {
+        const int64_t end = ptr[i + 1];
+        int64_t e = ptr[i];
+        while (e < end && block[e] < of.first)
+            e++;
+        if (e == end || block[e] >= of.end)
+            continue;
+        float t[UZ_LANES_MOST][ROWS_MOST] = {{0}};
+        for (int l = 0; l < lanes; l++)
+            for (int r = 0; r < b; r++)
+                t[l][r] = step->inverse[i * b + r] > 0.0F ? step->t[(i * lanes + l) * width + r] : 0.0F;
+        const float *P = level->value + e * b * k;
+        for (; e < end && block[e] < of.end; e++, P += (int64_t)b * k)
             for (int l = 0; l < lanes; l++) {
-                const float *t = step->t + (i * lanes + l) * width;
-                float *to = step->coarse + ((int64_t)level->block[e] * lanes + l) * 4 * parts;
+                float *to = coarse + ((int64_t)block[e] * lanes + l) * 4 * parts;
                 for (int q = 0; q < parts; q++) {
                     four sum = *(four *)(to + 4 * q);
                     for (int r = 0; r < b; r++)
-                        sum += *(const four *)(P + r * k + 4 * q) * (step->inverse[i * b + r] > 0.0F ? t[r] : 0.0F);
+                        sum += *(const four *)(P + r * k + 4 * q) * t[l][r];
                     *(four *)(to + 4 * q) = sum;
                 }
             }
-        }
+    }
 }
 
 /* x += P coarse, but at held dofs. */
