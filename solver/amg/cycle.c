@@ -89,6 +89,7 @@ static inline __attribute__((always_inline)) void store(float *to, const float *
 /* Nodes, or aggregates where a step is one to these: what of it is to be done. */
 typedef struct {
     int64_t first, end;
+    double *product; /* lanes: what these have of it */
 } range;
 
 /* x = (D + L)^-1 b, t = b - A x, of which L'x alone is not 0; of nodes whose blocks are among themselves, or with those
@@ -131,18 +132,21 @@ static inline __attribute__((always_inline)) void sweep_down(const uz_level_step
     }
 }
 
-/* x = (D + L')^-1 (b - L x), likewise, those after them being done. t: zeros before the first of all. */
-static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *step, range of, int b, int lanes)
+/* x = (D + L')^-1 (b - L x), likewise, those after them being done. t: zeros before the first of all. rises: b is
+ * D swept, and product = swept'(D x + t). */
+static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *step, range of, bool rises, int b,
+                                                           int lanes)
 {
     const uz_level *level = step->level;
     const int width = uz_width(b);
+    double product[UZ_LANES_MOST] = {0.0};
     for (int64_t i = of.end - 1; i >= of.first; i--) {
         const float *own = level->diag + i * b * b, *inverse = step->inverse + i * b;
         float s[UZ_LANES_MOST][ROWS_MOST] = {{0}}, value[UZ_LANES_MOST][ROWS_MOST] = {{0}};
         for (int l = 0; l < lanes; l++)
             for (int r = 0; r < b; r++) {
                 const int64_t at = (i * lanes + l) * width + r;
-                s[l][r] = step->b[at] - step->t[at];
+                s[l][r] = (rises ? own[r * b + r] * step->swept[at] : step->b[at]) - step->t[at];
                 value[l][r] = step->x[at];
             }
         gather(s, level, step->x, i, true, b, lanes);
@@ -157,12 +161,17 @@ static inline __attribute__((always_inline)) void sweep_up(const uz_level_step *
                 float above = 0.0F;
                 for (int c = r + 1; c < b; c++)
                     above += own[r * b + c] * value[l][c];
-                step->t[(i * lanes + l) * width + r] += above;
+                const int64_t at = (i * lanes + l) * width + r;
+                above = step->t[at] += above;
                 x[r] = value[l][r];
+                if (rises)
+                    product[l] += (double)step->swept[at] * (double)(own[r * b + r] * value[l][r] + above);
             }
         }
         scatter(step->t, level, value, i, b, lanes);
     }
+    for (int l = 0; rises && l < lanes; l++)
+        of.product[l] = product[l];
 }
 
 /* x = (D + L) swept. */
@@ -220,9 +229,9 @@ static inline __attribute__((always_inline)) void restrict_to(const uz_level_ste
     }
 }
 
-/* x += P coarse, but at held dofs. */
-static inline __attribute__((always_inline)) void prolong_from(const uz_level_step *step, range of, int b, int k,
-                                                               int lanes)
+/* x += P coarse, but at held dofs; places: x = P coarse, 0 there, and t = 0. */
+static inline __attribute__((always_inline)) void prolong_from(const uz_level_step *step, range of, bool places, int b,
+                                                               int k, int lanes)
 {
     const uz_level *level = step->level;
     const int width = uz_width(b), parts = k > 4 ? 2 : 1;
@@ -239,11 +248,17 @@ static inline __attribute__((always_inline)) void prolong_from(const uz_level_st
                 }
             }
         }
-        for (int l = 0; l < lanes; l++)
+        for (int l = 0; l < lanes; l++) {
+            float *x = step->x + (i * lanes + l) * width, value[ROWS_MOST] = {0}, zero[ROWS_MOST] = {0};
             for (int r = 0; r < b; r++)
                 if (step->inverse[i * b + r] > 0.0F)
-                    step->x[(i * lanes + l) * width + r] +=
-                        (sum[l][r][0] + sum[l][r][1]) + (sum[l][r][2] + sum[l][r][3]);
+                    value[r] = (sum[l][r][0] + sum[l][r][1]) + (sum[l][r][2] + sum[l][r][3]);
+            for (int r = 0; !places && r < b; r++)
+                value[r] += x[r];
+            store(x, value, b);
+            if (places)
+                store(step->t + (i * lanes + l) * width, zero, b);
+        }
     }
 }
 
@@ -259,9 +274,13 @@ static inline __attribute__((always_inline)) void take_part(const uz_level_step 
     if (what == UZ_STEP_RESTRICT)
         restrict_to(s, of, b, k, lanes);
     if (what == UZ_STEP_PROLONG)
-        prolong_from(s, of, b, k, lanes);
+        prolong_from(s, of, false, b, k, lanes);
+    if (what == UZ_STEP_PLACE)
+        prolong_from(s, of, true, b, k, lanes);
     if (what == UZ_STEP_SWEEP_UP)
-        sweep_up(s, of, b, lanes);
+        sweep_up(s, of, false, b, lanes);
+    if (what == UZ_STEP_RISE)
+        sweep_up(s, of, true, b, lanes);
 }
 
 /* For each size of blocks its own loops; with a sanitizer the same ones for all, as its checks in every copy take five
@@ -305,20 +324,21 @@ typedef struct {
     const uz_level_step *step;
     void (*take)(const uz_level_step *s, int what, range of);
     int what, ranges;
+    double product[2][UZ_PARTS_MOST][UZ_LANES_MOST]; /* of the parts and of the rest */
 } sharing;
 
 static void take_matrix_part(void *ctx, int part)
 {
-    const sharing *x = ctx;
+    sharing *x = ctx;
     const int64_t *first = x->step->level->A.part + part;
-    x->take(x->step, x->what, (range){first[0], first[1]});
+    x->take(x->step, x->what, (range){first[0], first[1], x->product[0][part]});
 }
 
 static void take_seam(void *ctx, int seam)
 {
-    const sharing *x = ctx;
+    sharing *x = ctx;
     const int64_t *first = x->step->level->A.seam + seam;
-    x->take(x->step, x->what, (range){first[0], first[1]});
+    x->take(x->step, x->what, (range){first[0], first[1], x->product[1][seam]});
 }
 
 /* What is in no part. */
@@ -328,7 +348,7 @@ static void take_rest(sharing *x)
     if (A->seams > 0)
         uz_aside_share(take_seam, x, A->seams);
     else
-        x->take(x->step, x->what, (range){A->parts > 0 ? A->part[A->parts] : 0, A->nodes});
+        x->take(x->step, x->what, (range){A->parts > 0 ? A->part[A->parts] : 0, A->nodes, x->product[1][0]});
 }
 
 static void take_range(void *ctx, int part)
@@ -336,7 +356,7 @@ static void take_range(void *ctx, int part)
     const sharing *x = ctx;
     const uz_level *level = x->step->level;
     const int64_t n = x->what == UZ_STEP_RESTRICT ? level->aggregates : level->A.nodes;
-    x->take(x->step, x->what, (range){n * part / x->ranges, n * (part + 1) / x->ranges});
+    x->take(x->step, x->what, (range){n * part / x->ranges, n * (part + 1) / x->ranges, NULL});
 }
 
 static void take_step(sharing *x, int what)
@@ -344,9 +364,9 @@ static void take_step(sharing *x, int what)
     const uz_blocks *A = &x->step->level->A;
     x->what = what;
     x->ranges = A->parts > 0 ? uz_aside_threads() : 1;
-    if (what == UZ_STEP_SWEEP_UP)
+    if (what == UZ_STEP_SWEEP_UP || what == UZ_STEP_RISE)
         take_rest(x);
-    if (what == UZ_STEP_RESTRICT || what == UZ_STEP_PROLONG)
+    if (what == UZ_STEP_RESTRICT || what == UZ_STEP_PROLONG || what == UZ_STEP_PLACE)
         uz_aside_share(take_range, x, x->ranges);
     else if (A->parts > 0)
         uz_aside_share(take_matrix_part, x, A->parts);
@@ -362,16 +382,17 @@ static void clear(void *ctx, int64_t begin, int64_t end)
 void uz_level_take_step(const uz_level_step *s, int parts)
 {
     sharing x = {.step = s, .take = !uz_cpu_has_avx2_fma() ? take_plain : s->lanes == 1 ? take_fused : take_both_fused};
-    for (int what = UZ_STEP_SWEEP_DOWN; what <= UZ_STEP_RAISE; what <<= 1)
-        if (parts & what)
-            take_step(&x, what);
-    if (parts & UZ_STEP_RESTRICT)
-        take_step(&x, UZ_STEP_RESTRICT);
-    if (parts & UZ_STEP_PROLONG)
-        take_step(&x, UZ_STEP_PROLONG);
-    if (parts & UZ_STEP_SWEEP_UP) {
-        uz_by_pieces(clear, s->t, s->level->A.nodes * s->lanes * uz_width(s->level->A.b));
-        take_step(&x, UZ_STEP_SWEEP_UP);
+    for (int what = UZ_STEP_SWEEP_DOWN; what <= UZ_STEP_RISE; what <<= 1) {
+        if (!(parts & what))
+            continue;
+        if (what == UZ_STEP_SWEEP_UP)
+            uz_by_pieces(clear, s->t, s->level->A.nodes * s->lanes * uz_width(s->level->A.b));
+        take_step(&x, what);
+    }
+    for (int l = 0; (parts & UZ_STEP_RISE) && l < s->lanes; l++) {
+        s->product[l] = 0.0;
+        for (int p = 0; p < 2 * UZ_PARTS_MOST; p++)
+            s->product[l] += x.product[p / UZ_PARTS_MOST][p % UZ_PARTS_MOST][l];
     }
 }
 

@@ -125,15 +125,18 @@ static inline int uz_width(int b)
  * x += P coarse and x = (D + L')^-1 (b - L x), t being room, and afterwards L'x.
  * Dofs without an inverse take no part.
  *
- * Instead of the sweep down, of conjugate gradients whose residual is kept swept (rough.c): REDUCE: x = (D + L)^-1 b,
- * swept -= share (along + x), each lane by a share of its own, and t = -L'swept; RAISE: x = (D + L) swept. */
+ * Of conjugate gradients whose residual is kept swept (rough.c), instead of the sweep down: REDUCE: x = (D + L)^-1 b,
+ * swept -= share (along + x), each lane by a share of its own, and t = -L'swept; RAISE: x = (D + L) swept. Instead of
+ * the way up: PLACE: x = P coarse, and t = 0, which RISE begins with: x = (D + L')^-1 (D swept - L x), t = L'x and
+ * product = swept'(D x + t) of each lane, in double precision; swept is 0 at dofs without an inverse. */
 typedef struct {
     const uz_level *level;
     const float *inverse, *b;
     float *x, *t, *coarse; /* coarse: the next level's right-hand side on the way down, its answer on the way up */
     int k, lanes;
-    float *swept, share[UZ_LANES_MOST]; /* of the last two parts alone */
+    float *swept, share[UZ_LANES_MOST]; /* of these alone */
     const float *along;
+    double *product; /* lanes */
 } uz_level_step;
 enum {
     UZ_STEP_SWEEP_DOWN = 1,
@@ -141,7 +144,9 @@ enum {
     UZ_STEP_RAISE = 4,
     UZ_STEP_RESTRICT = 8,
     UZ_STEP_PROLONG = 16,
-    UZ_STEP_SWEEP_UP = 32
+    UZ_STEP_PLACE = 32,
+    UZ_STEP_SWEEP_UP = 64,
+    UZ_STEP_RISE = 128
 };
 void uz_level_take_step(const uz_level_step *step, int parts);
 

@@ -30,10 +30,10 @@ typedef struct {
     uz_level level; /* 0, as it is in this room */
     uz_level_step step;
     float *x, *p, *w, *s;
-    float *z, *t, *b, *d; /* of the room: z, L'z, either D z + L'z or D p + 2 w, and D */
-    int64_t n;            /* numbers of each */
-    double square;        /* r'z */
-    float factor;
+    float *z, *t, *d;          /* of the room: z, L'z and D */
+    int64_t n;                 /* numbers of each */
+    double square, curvature;  /* r'z and p'K p */
+    float along, beta;         /* x lacks p so many times; that of the next p */
     double unit;               /* of them all */
     double *whole_x, *whole_r; /* of dofs */
     const bool *held;
@@ -51,57 +51,57 @@ static void find_diagonal(void *ctx, int64_t begin, int64_t end)
             v->d[4 * i + r] = v->step.inverse[i * b + r] > 0.0F ? v->level.diag[i * b * b + r * b + r] : 0.0F;
 }
 
-static void enter_sweep_up(void *ctx, int64_t begin, int64_t end)
-{
-    const rough *v = ctx;
-    const float *restrict d = v->d, *restrict s = v->s;
-    float *restrict b = v->b, *restrict z = v->z;
-    for (int64_t j = begin; j < end; j++) {
-        b[j] = d[j] * s[j];
-        z[j] = 0.0F;
-    }
-}
-
-static void leave_sweep_up(void *ctx, int64_t begin, int64_t end)
-{
-    const rough *v = ctx;
-    const float *restrict d = v->d, *restrict z = v->z, *restrict t = v->t;
-    float *restrict b = v->b;
-    for (int64_t j = begin; j < end; j++)
-        b[j] = d[j] * z[j] + t[j];
-}
-
 /* From s and t = -L's: z, L'z and r'z. */
 static uz_status precondition(rough *v, uz_error *err)
 {
     uz_level_take_step(&v->step, UZ_STEP_RESTRICT);
     const uz_status status = uz_cycle_below(v->mg, v->room, 1, 1, err);
-    uz_by_pieces(enter_sweep_up, v, v->n);
     uz_level_step up = v->step;
     up.coarse = v->room->x[1];
-    uz_level_take_step(&up, UZ_STEP_PROLONG | UZ_STEP_SWEEP_UP);
-    uz_by_pieces(leave_sweep_up, v, v->n);
-    v->square = uz_long_dot_single(v->n, v->s, v->b);
+    up.product = &v->square;
+    uz_level_take_step(&up, UZ_STEP_PLACE | UZ_STEP_RISE);
     return status;
 }
 
-static void turn_direction(void *ctx, int64_t begin, int64_t end)
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double four __attribute__((vector_size(32)));
+
+/* x takes the last step, if it is wanted; p = z + beta p, w = L'z + beta w; p'(D p + 2 w). */
+UZ_INLINE double turn_piece(const rough *v, int64_t begin, int64_t end, bool moves)
 {
-    const rough *v = ctx;
-    const float beta = v->factor, *restrict d = v->d, *restrict z = v->z, *restrict t = v->t;
-    float *restrict p = v->p, *restrict w = v->w, *restrict b = v->b;
-    for (int64_t j = begin; j < end; j++) {
-        p[j] = z[j] + beta * p[j];
-        w[j] = t[j] + beta * w[j];
-        b[j] = d[j] * p[j] + 2.0F * w[j];
+    const float along = v->along, beta = v->beta;
+    four sum = {0.0};
+    for (int64_t j = begin; j < end; j += 4) {
+        const four_floats d = *(const four_floats *)(v->d + j), z = *(const four_floats *)(v->z + j),
+                          t = *(const four_floats *)(v->t + j);
+        four_floats *p = (four_floats *)(v->p + j), *w = (four_floats *)(v->w + j);
+        if (moves)
+            *(four_floats *)(v->x + j) += along * *p;
+        const four_floats next = z + beta * *p, image = t + beta * *w;
+        *p = next;
+        *w = image;
+        sum += __builtin_convertvector(next, four) * __builtin_convertvector(d * next + 2.0F * image, four);
     }
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/* Another step along p, and a new p. *along 0: rounding lets none be made, or K: double precision tells. */
+static double turn_nodes(void *ctx, int64_t begin, int64_t end)
+{
+    const rough *v = ctx;
+    return v->along > 0.0F ? turn_piece(v, 4 * begin, 4 * end, true) : turn_piece(v, 4 * begin, 4 * end, false);
+}
+
+static void turn_direction(rough *v)
+{
+    v->curvature = uz_sum_by_pieces(turn_nodes, v, v->n / 4);
+    v->along = 0.0F;
+}
+
+/* Another step along p, which x lacks then. *along 0: rounding lets none be made, or K: double precision tells. */
 static uz_status take_step(rough *v, double *along, uz_error *err)
 {
-    const double curvature = uz_long_dot_single(v->n, v->p, v->b), last = v->square;
-    *along = curvature > 0.0 ? last / curvature : 0.0;
+    const double last = v->square;
+    *along = v->curvature > 0.0 ? last / v->curvature : 0.0;
     if (!(*along > 0.0) || isinf(*along))
         return UZ_OK;
     uz_level_step down = v->step;
@@ -110,7 +110,7 @@ static uz_status take_step(rough *v, double *along, uz_error *err)
     down.share[0] = (float)*along;
     uz_level_take_step(&down, UZ_STEP_REDUCE);
     const uz_status status = precondition(v, err);
-    v->factor = (float)(v->square / last);
+    v->beta = (float)(v->square / last);
     return status;
 }
 
@@ -129,7 +129,6 @@ static uz_status begin(rough *v, bool *begun, const uz_aggregates *mg, uz_multig
                  .s = second + n,
                  .z = room->x[0],
                  .t = room->t[0],
-                 .b = room->b[0],
                  .d = room->d,
                  .n = n,
                  .unit = uz_read_dofs(room->b[0], mg, r),
@@ -145,8 +144,7 @@ static uz_status begin(rough *v, bool *begun, const uz_aggregates *mg, uz_multig
     const uz_status status = precondition(v, err);
     memset(first, 0, 2 * (size_t)n * sizeof *first);
     memset(v->x, 0, (size_t)n * sizeof *v->x);
-    v->factor = 0.0F;
-    uz_by_pieces(turn_direction, v, n);
+    turn_direction(v);
     return status;
 }
 
@@ -163,7 +161,7 @@ static void end(const rough *v)
 static void move_on(void *ctx, int64_t begin, int64_t end)
 {
     const rough *v = ctx;
-    const float alpha = v->factor, *restrict p = v->p;
+    const float alpha = v->along, *restrict p = v->p;
     float *restrict x = v->x;
     for (int64_t j = begin; j < end; j++)
         x[j] += alpha * p[j];
@@ -189,14 +187,13 @@ static uz_status iterate(rough *v, uz_cg_info *info, double goal, const uz_cg_st
         status = take_step(v, &along, err);
         if (!(along > 0.0))
             break;
-        const float beta = v->factor;
-        v->factor = (float)along;
-        uz_by_pieces(move_on, v, v->n);
-        v->factor = beta;
+        v->along = (float)along;
         info->iterations++;
         if (v->square > goal * goal)
-            uz_by_pieces(turn_direction, v, v->n);
+            turn_direction(v);
     }
+    if (v->along > 0.0F)
+        uz_by_pieces(move_on, v, v->n);
     return status;
 }
 
@@ -246,7 +243,7 @@ uz_status uz_step_roughly(const uz_multigrid *base, uz_multigrid_room *room, con
         status = take_step(&v, &along, err);
         moves = along > 0.0;
         go_on = moves && status == UZ_OK && visit(ctx, along, unit * before, unit * v.square);
-        uz_by_pieces(turn_direction, &v, v.n);
+        turn_direction(&v);
     }
     end(&v);
     return status;

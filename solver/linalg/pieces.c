@@ -103,14 +103,13 @@ void uz_by_columns(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx
 
 /* ----------------------------------------------------------------------- sums */
 
-/* What a piece of two vectors has. */
-typedef double (*of_piece)(int64_t n, const void *x, const void *y);
+/* What numbers from `begin` to `end` have. */
+typedef double (*of_piece)(void *ctx, int64_t begin, int64_t end);
 
 /* A sum of which each piece has its own number. */
 typedef struct {
     of_piece of;
-    const char *x, *y;
-    size_t width;    /* of a number */
+    void *ctx;
     int64_t n, size; /* of a piece */
     double piece[PIECES_MOST];
 } sum;
@@ -119,20 +118,15 @@ typedef struct {
 static void find_pieces(void *ctx, int64_t begin, int64_t end)
 {
     sum *s = ctx;
-    for (int64_t k = begin; k < end; k++) {
-        const int64_t from = k * s->size, n = from + s->size < s->n ? s->size : s->n - from;
-        const size_t at = (size_t)from * s->width;
-        s->piece[k] = s->of(n, s->x + at, s->y + at);
-    }
+    for (int64_t k = begin; k < end; k++)
+        s->piece[k] = s->of(s->ctx, k * s->size, (k + 1) * s->size < s->n ? (k + 1) * s->size : s->n);
 }
 
 /* Fills s; returns how many pieces there are. */
-static int64_t find_all(sum *s, of_piece of, size_t width, int64_t n, const void *x, const void *y)
+static int64_t find_all(sum *s, of_piece of, void *ctx, int64_t n)
 {
     s->of = of;
-    s->x = x;
-    s->y = y;
-    s->width = width;
+    s->ctx = ctx;
     s->n = n;
     s->size = s->n / PIECES_MOST < LEAST ? LEAST : s->n / PIECES_MOST + 1;
     const int64_t pieces = (s->n + s->size - 1) / s->size;
@@ -140,74 +134,83 @@ static int64_t find_all(sum *s, of_piece of, size_t width, int64_t n, const void
     return pieces;
 }
 
-static double find_sum(of_piece of, size_t width, int64_t n, const void *x, const void *y)
+double uz_sum_by_pieces(double (*of)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n)
 {
     sum s;
-    const int64_t pieces = find_all(&s, of, width, n, x, y);
+    const int64_t pieces = find_all(&s, of, ctx, n);
     double all = 0.0;
     for (int64_t k = 0; k < pieces; k++)
         all += s.piece[k];
     return all;
 }
 
-static double find_dot(int64_t n, const void *x, const void *y)
+typedef struct {
+    const double *x, *y;
+} vectors;
+
+static double find_dot(void *ctx, int64_t begin, int64_t end)
 {
-    return uz_dot(n, x, y);
+    const vectors *v = ctx;
+    return uz_dot(end - begin, v->x + begin, v->y + begin);
 }
 
 double uz_long_dot(int64_t n, const double *x, const double *y)
 {
-    return find_sum(find_dot, sizeof *x, n, x, y);
+    return uz_sum_by_pieces(find_dot, &(vectors){x, y}, n);
 }
 
 typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
 typedef double four __attribute__((vector_size(32)));
 enum { SUMS = 4 };
 
-static double find_dot_single(int64_t n, const void *x, const void *y)
+typedef struct {
+    const float *x, *y;
+} single_vectors;
+
+static double find_dot_single(void *ctx, int64_t begin, int64_t end)
 {
-    const float *a = x, *b = y;
+    const single_vectors *v = ctx;
+    const float *a = v->x, *b = v->y;
     four lanes[SUMS] = {{0.0}}; /* that wait for no other */
-    int64_t j = 0;
-    for (; j + 4 * SUMS <= n; j += 4 * SUMS)
+    int64_t j = begin;
+    for (; j + 4 * SUMS <= end; j += 4 * SUMS)
         for (int s = 0; s < SUMS; s++)
             lanes[s] += __builtin_convertvector(*(const four_floats *)(a + j + 4 * s), four) *
                         __builtin_convertvector(*(const four_floats *)(b + j + 4 * s), four);
     const four all_lanes = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
     double all = (all_lanes[0] + all_lanes[1]) + (all_lanes[2] + all_lanes[3]);
-    for (; j < n; j++)
+    for (; j < end; j++)
         all += (double)a[j] * (double)b[j];
     return all;
 }
 
 double uz_long_dot_single(int64_t n, const float *x, const float *y)
 {
-    return find_sum(find_dot_single, sizeof *x, n, x, y);
+    return uz_sum_by_pieces(find_dot_single, &(single_vectors){x, y}, n);
 }
 
-static double find_largest(int64_t n, const void *x, const void *y)
+static double find_largest(void *ctx, int64_t begin, int64_t end)
 {
-    const double *of = x;
+    const vectors *v = ctx;
     double most = 0.0;
-    (void)y;
-    for (int64_t j = 0; j < n; j++)
-        most = fabs(of[j]) > most ? fabs(of[j]) : most;
+    for (int64_t j = begin; j < end; j++)
+        most = fabs(v->x[j]) > most ? fabs(v->x[j]) : most;
     return most;
 }
 
-static double find_largest_product(int64_t n, const void *x, const void *y)
+static double find_largest_product(void *ctx, int64_t begin, int64_t end)
 {
-    const double *a = x, *b = y;
+    const vectors *v = ctx;
     double most = 0.0;
-    for (int64_t j = 0; j < n; j++)
-        most = fabs(a[j] * b[j]) > most ? fabs(a[j] * b[j]) : most;
+    for (int64_t j = begin; j < end; j++)
+        most = fabs(v->x[j] * v->y[j]) > most ? fabs(v->x[j] * v->y[j]) : most;
     return most;
 }
 
 static double find_most(of_piece of, int64_t n, const double *x, const double *y)
 {
     sum s;
-    const int64_t pieces = find_all(&s, of, sizeof *x, n, x, y);
+    const int64_t pieces = find_all(&s, of, &(vectors){x, y}, n);
     double most = 0.0;
     for (int64_t k = 0; k < pieces; k++)
         most = fmax(most, s.piece[k]);

@@ -13,6 +13,8 @@ void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx,
 /* run(ctx, begin, end) for ranges that make up the columns of a lower triangle, rows ascending in each: what runs at
  * once has no row in common, and in which order a row meets its columns the matrix alone decides. */
 void uz_by_columns(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, const uz_csc *A);
+/* The sum of of(ctx, begin, end) for ranges that make up 0..n. */
+double uz_sum_by_pieces(double (*of)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n);
 /* x'y. */
 double uz_long_dot(int64_t n, const double *x, const double *y);
 /* The same of single numbers, their products and sums in double precision. */
