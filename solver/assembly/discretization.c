@@ -29,6 +29,7 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
     if (contact->kind != UZ_OBSTACLE_BODY)
         return UZ_OK;
     in->with = uz_mesh_group(&model->mesh, contact->with, UZ_PLACE("contacts", index, "with"), err);
+    in->later = in->on == in->with && uz_may_be_finite(scene);
     return in->with ? UZ_OK : UZ_ERR_SCENE;
 }
 

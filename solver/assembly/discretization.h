@@ -19,11 +19,11 @@ typedef struct {
     int64_t index;        /* its number in the scene, for pointers such as "/contacts/2/with" */
     const uz_group *on;   /* the surface that has the rows: once sites are found that of the slave */
     const uz_group *with; /* that of another body; NULL: an obstacle */
+    bool later;           /* a surface that may come to touch itself where large deformation leads it */
     bool tie;             /* a tie's: nodes of rigid groups cannot be its slaves */
     double *room;         /* n_nodes, zero, and left zero */
-    /* Contact at a displaced place: `model` has the nodes there, and this is the body before anything moves, with its
-     * sites. What is chosen once (which side is the slave, what smooth surfaces are off their facets) is chosen there,
-     * and a contact may find nothing to touch any more. NULL: `model` is that body. */
+    /* Contact at a displaced place, where `model` has the nodes and nothing may touch: the body at rest with its sites,
+     * where what is chosen once is (the slave, what smooth surfaces are off their facets). NULL: `model` is it. */
     const uz_body_model *rest;
 } uz_contact_input;
 

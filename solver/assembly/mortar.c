@@ -425,7 +425,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
                 (isfinite(sites->gap[p]) && sites->of[p] & (k == 0 ? UZ_SLAVE_ON : UZ_SLAVE_WITH));
     }
     free(some.side);
-    if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
+    if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest && !in->later) {
         status = uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", in->index, "on"),
                          "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }

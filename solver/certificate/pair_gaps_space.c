@@ -27,6 +27,7 @@ typedef struct {
     unsigned char border[PLACES]; /* bits: of its edges that are the surface's border, those that the place is on */
     int pieces, corners, nodes;
     double x[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
     double middle[3], reach, length; /* all of it is within `reach` of `middle` */
 } sheet;
 
@@ -74,12 +75,11 @@ static unsigned edges_at(const sheet *s, int k, int l)
 /* border: bits of the face's edges. */
 static void make_sheet(sheet *s, const uz_body_model *model, uz_face face, const double *u, unsigned border)
 {
-    int64_t node[UZ_FACE_NODES];
-    s->nodes = uz_mesh_face(node, &model->mesh, face);
+    s->nodes = uz_mesh_face(s->node, &model->mesh, face);
     s->corners = s->nodes % 3 == 0 ? 3 : 4;
     s->length = s->reach = 0;
     for (int i = 0; i < 3 * s->nodes; i++)
-        s->x[i] = model->mesh.xyz[3 * node[i / 3] + i % 3] + u[3 * node[i / 3] + i % 3];
+        s->x[i] = model->mesh.xyz[3 * s->node[i / 3] + i % 3] + u[3 * s->node[i / 3] + i % 3];
     for (int a = 0; a < s->nodes; a++)
         for (int b = 0; b < a; b++)
             s->length = fmax(s->length, sqrt(uz_distance2(s->x + 3 * a, s->x + 3 * b, 3)));
@@ -202,7 +202,9 @@ static double angle_at(const double s[3], const double *const at[3])
     return acos(fmin(1, fmax(-1, uz_dot3(b, c) / sqrt(uz_dot3(b, b) * uz_dot3(c, c))))) / acos(-1);
 }
 
-static void look_at_triangle(nearest *to, const double x[3], const sheet *s, const int place[3])
+/* looks: where the point is; NULL: on another body. */
+static void look_at_triangle(nearest *to, const double x[3], const uz_own_look *looks, const sheet *s,
+                             const int place[3])
 {
     const double *const at[3] = {s->at[place[0]], s->at[place[1]], s->at[place[2]]};
     double share[3], off[3], ab[3], ac[3], normal[3];
@@ -220,7 +222,7 @@ static void look_at_triangle(nearest *to, const double x[3], const sheet *s, con
         off[c] = x[c] - share[0] * at[0][c] - share[1] * at[1][c] - share[2] * at[2][c];
     const double distance = sqrt(uz_dot3(off, off));
     uz_cross3(normal, ab, ac);
-    if (!(uz_unit3(normal) > 0) || distance > to->distance + SAME * size)
+    if (!(uz_unit3(normal) > 0) || distance > to->distance + SAME * size || (looks && !uz_own_may_meet(looks, normal)))
         return;
     if (distance < to->distance - SAME * size)
         *to = (nearest){.distance = distance, .length = s->length};
@@ -237,44 +239,90 @@ static void look_at_triangle(nearest *to, const double x[3], const sheet *s, con
     }
 }
 
-static void look_at_sheet(nearest *to, const double x[3], const sheet *s)
+static void look_at_sheet(nearest *to, const double x[3], const uz_own_look *looks, const sheet *s)
 {
     enum { ROW = PIECES + 1 };
     for (int k = 0; k < s->pieces; k++)
         for (int l = 0; l < (s->corners == 3 ? s->pieces - k : s->pieces); l++) {
             const int p = k * ROW + l;
-            look_at_triangle(to, x, s, (const int[3]){p, p + ROW, p + 1});
+            look_at_triangle(to, x, looks, s, (const int[3]){p, p + ROW, p + 1});
             if (s->corners == 4 || k + l + 1 < s->pieces)
-                look_at_triangle(to, x, s, (const int[3]){p + ROW, p + ROW + 1, p + 1});
+                look_at_triangle(to, x, looks, s, (const int[3]){p + ROW, p + ROW + 1, p + 1});
         }
 }
 
-static void look_from(double *least, double *part, const sheet *own, const double x[3], const sheet *other, int64_t n)
+/* The outward normal of a face, of any length. */
+static void normal_at(double normal[3], const sheet *s, double k, double l)
+{
+    const uz_side side = {.dim = 3, .nodes = s->nodes, .xyz = s->x};
+    const double point[2] = {s->corners == 3 ? k : 2 * k - 1, s->corners == 3 ? l : 2 * l - 1};
+    double N[UZ_FACE_NODES], slope[UZ_FACE_NODES][3], along[2][3] = {{0}};
+    uz_side_gradients(N, slope, &side, point);
+    for (int a = 0; a < s->nodes; a++)
+        for (int c = 0; c < 6; c++)
+            along[c / 3][c % 3] += slope[a][c / 3] * s->x[3 * a + c % 3];
+    uz_cross3(normal, along[0], along[1]);
+}
+
+static bool have_common_node(const sheet *a, const sheet *b)
+{
+    bool so = false;
+    for (int i = 0; i < a->nodes; i++)
+        for (int j = 0; j < b->nodes; j++)
+            so = so || a->node[i] == b->node[j];
+    return so;
+}
+
+/* From the point (k, l) of a face. */
+static void look_from(double *least, double *part, const sheet *own, double k, double l, const sheet *other, int64_t n,
+                      const uz_own_elements *elements)
 {
     nearest at = {.distance = INFINITY};
-    for (int64_t i = 0; i < n; i++)
-        if (sqrt(uz_distance2(x, other[i].middle, 3)) - other[i].reach <= at.distance + SAME * other[i].length)
-            look_at_sheet(&at, x, &other[i]);
-    if (!isfinite(at.distance) || (at.border && !at.before))
+    const bool itself = elements->xyz;
+    double x[3];
+    place_at(x, own, k, l);
+    uz_own_look looks = {.held = itself && uz_own_elements_hold(elements, x)};
+    normal_at(looks.normal, own, k, l);
+    /* first the one that may be the nearest, as beside it there is little to look at in most of the others */
+    int64_t first = -1;
+    double least_far = INFINITY;
+    for (int64_t i = 0; i < n; i++) {
+        const double far = sqrt(uz_distance2(x, other[i].middle, 3)) - other[i].reach;
+        if (far < least_far && !(itself && have_common_node(own, &other[i]))) {
+            least_far = far;
+            first = i;
+        }
+    }
+    for (int64_t q = 0; q < n && first >= 0; q++) {
+        const int64_t i = q == 0 ? first : q <= first ? q - 1 : q;
+        if (sqrt(uz_distance2(x, other[i].middle, 3)) - other[i].reach <= at.distance + SAME * other[i].length &&
+            !(itself && have_common_node(own, &other[i])))
+            look_at_sheet(&at, x, itself ? &looks : NULL, &other[i]);
+    }
+    if (!isfinite(at.distance) || (at.border && !at.before && !looks.held))
         return;
-    const double gap = uz_dot3(at.normal, at.off) < 0 ? -at.distance : at.distance;
+    const double gap = looks.held || uz_dot3(at.normal, at.off) < 0 ? -at.distance : at.distance;
+    if (itself && !looks.held && gap < -UZ_OWN_TOUCHES * at.length)
+        return;
     *least = fmin(*least, gap);
     *part = fmin(*part, gap / fmax(own->length, at.length));
 }
 
 uz_status uz_pair_gaps_space(double *least, double *part, const uz_body_model *model, const uz_group *const group[2],
-                             const double *u, int steps, uz_error *err)
+                             const double *u, int steps, uz_own_elements *own, uz_error *err)
 {
     sheet *sheets[2] = {make_sheets(model, group[0], u), make_sheets(model, group[1], u)};
-    for (int j = 0; j < 2 && sheets[0] && sheets[1]; j++)
-        for (int64_t i = 0; i < group[j]->n_faces; i++)
-            for (int k = 0; k <= steps; k++)
-                for (int l = 0; l <= (sheets[j][i].corners == 3 ? steps - k : steps); l++) {
-                    double x[3];
-                    place_at(x, &sheets[j][i], (double)k / steps, (double)l / steps);
-                    look_from(least, part, &sheets[j][i], x, sheets[!j], group[!j]->n_faces);
-                }
     const bool room = sheets[0] && sheets[1];
+    for (int j = 0; j < (group[0] == group[1] ? 1 : 2) && room; j++)
+        for (int64_t i = 0; i < group[j]->n_faces; i++) {
+            const sheet *s = &sheets[j][i];
+            if (own->xyz)
+                uz_own_elements_near(own, s->middle, s->reach);
+            for (int k = 0; k <= steps; k++)
+                for (int l = 0; l <= (s->corners == 3 ? steps - k : steps); l++)
+                    look_from(least, part, s, (double)k / steps, (double)l / steps, sheets[!j], group[!j]->n_faces,
+                              own);
+        }
     free(sheets[0]);
     free(sheets[1]);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surfaces of a contact");

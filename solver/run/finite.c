@@ -16,6 +16,7 @@
 #include "run/settings.h"
 #include "run/solve.h"
 #include "scene/check.h"
+#include "scene/corner_table.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -179,29 +180,6 @@ static uz_status check_ties(const uz_body_model *base, const uz_scene *scene, uz
     return status;
 }
 
-/* What checks of the scene alone could not see. */
-static uz_status check_body(const uz_body_model *base, const uz_scene *scene, uz_error *err)
-{
-    for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_contact *contact = &scene->contacts[k];
-        if (contact->kind != UZ_OBSTACLE_BODY)
-            continue;
-        const char *where = UZ_PLACE("contacts", k, "with");
-        const uz_group *on = uz_mesh_group(&base->mesh, contact->on, where, err);
-        const uz_group *with = uz_mesh_group(&base->mesh, contact->with, where, err);
-        const int shared = on && with ? uz_groups_share_face(&base->mesh, on, with) : 0;
-        if (!on || !with)
-            return UZ_ERR_SCENE;
-        if (shared < 0)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of two surfaces");
-        if (shared > 0)
-            return uz_fail(err, UZ_ERR_SCENE, where,
-                           "finite kinematics have no contact of a surface with itself; name two surfaces without "
-                           "common sides");
-    }
-    return check_ties(base, scene, err);
-}
-
 static uz_status begin_load(uz_finite_run *run, uz_error *err)
 {
     const uz_mesh *mesh = &run->base.mesh;
@@ -269,7 +247,9 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
     if (status == UZ_OK)
-        status = check_body(&run->base, &run->scene, err);
+        status = check_ties(&run->base, &run->scene, err);
+    if (status == UZ_OK && uz_has_pairs(&run->scene))
+        status = uz_outer_sides(&run->outer, &run->base.mesh, err);
     if (status == UZ_OK)
         status = check_turns(run, err);
     if (status == UZ_OK)
@@ -297,6 +277,7 @@ static void end(uz_finite_run *run)
     uz_result_free(run->last);
     free(run->scene.supports);
     free(run->scene.loads);
+    free(run->outer.face);
     free(run->free_strain);
     free(run->loads);
     free(run->prescribed);

@@ -313,13 +313,12 @@ static uz_status pair_may_go(bool *may, const uz_finite_run *run, const uz_conta
                              const double *from, const double *to, bool beside, uz_error *err)
 {
     const uz_mesh *mesh = &run->base.mesh;
-    const uz_group *all = uz_mesh_group(mesh, "boundary", "", err);
     const uz_group *group[2] = {uz_mesh_group(mesh, contact->on, "", err), uz_mesh_group(mesh, contact->with, "", err)};
-    if (!all || !group[0] || !group[1])
+    if (!group[0] || !group[1])
         return UZ_ERR_SCENE;
-    for (int k = 0; k < 2 && *may; k++) {
+    for (int k = 0; k < 2 && *may && (k == 0 || group[0] != group[1]); k++) {
         skin s = {.mesh = mesh, .from = from, .to = to};
-        const bool room = make_skin(&s, group[!k], all, part);
+        const bool room = make_skin(&s, group[!k], &run->outer, part);
         for (int64_t i = 0; i < uz_group_node_count(mesh, group[k]) && room && *may; i++)
             *may = node_may_go(&s, uz_group_node_at(group[k], i), beside);
         free(s.piece);

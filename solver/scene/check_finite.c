@@ -68,9 +68,6 @@ static uz_status check_pair(const uz_scene *scene, int64_t i, uz_error *err)
         return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "smooth"),
                        "finite kinematics take sides of bodies as they are deformed; leave smooth out, and use quad8 "
                        "or tri6 where surfaces are curved");
-    if (strcmp(contact->on, contact->with) == 0)
-        return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("contacts", i, "with"),
-                       "finite kinematics have no contact of a surface with itself; name two surfaces");
     return UZ_OK;
 }
 

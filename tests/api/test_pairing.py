@@ -245,4 +245,5 @@ def test_obstacles_take_lists_too(s):
     check(s.post(box(["bottom", "middle"])).status == 422)
 
 
-service.main(globals())
+if __name__ == "__main__":
+    service.main(globals())
