@@ -75,8 +75,7 @@ typedef struct {
     uz_status (*solve_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, struct uz_cg_info *info, double *x,
                                double *r, const struct uz_cg_stop *stop, uz_error *err);
     /* The same steps from a residual r (n), until the visitor ends them, or rounding does: of the matrix in single
-     * precision that the cycle is made of, whose entries are those of K but for half of FLT_EPSILON. NULL: there is
-     * none. */
+     * precision that the cycle is made of, which is K but for `rough`. NULL: there is none. */
     uz_status (*step_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
                               void *ctx, uz_error *err);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
@@ -110,6 +109,8 @@ struct uz_multigrid {
     int levels;
     size_t bytes;
     double most;  /* a bound on lambda_max(diag(K)^-1 M) */
+    double rough; /* |x'(A - K)x| is at most so many times x'diag(K)x, A what steps in single precision have for K and
+                     what they round on the way */
     double drift; /* what single precision hides of a change, relative, in the energy norm; 0: not known */
     bool knows_K; /* without being handed it: of that only the diagonal is read, and need be there */
 };

@@ -12,6 +12,7 @@
 #include "core/hooks.h"
 #include "core/random.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -451,6 +452,9 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     if (status == UZ_OK)
         status = bound_by_diagonal(&mg->base.most, K, err);
     if (status == UZ_OK) {
+        /* Half of FLT_EPSILON of K's absolute values is rounded off, twice that with what is on the way; the norm of
+         * D^-1/2 |K| D^-1/2 is at most the largest row sum. */
+        mg->base.rough = FLT_EPSILON * sqrt(mg->base.most);
         mg->base.bytes = count_bytes(mg);
         *out = &mg->base;
     } else {

@@ -196,11 +196,9 @@ static uz_status take_steps(bounding *x, uz_cg *cg, const uz_csc *K, uz_error *e
     return status;
 }
 
-/* Rounding of K's entries to single precision makes K smaller by half of FLT_EPSILON times its absolute values at most,
- * of which the norm of D^-1/2 |K| D^-1/2 is no larger than the largest row sum, 1 + that of bound_by_diagonal; twice
- * that, for what is rounded on the way: K >= A - slack M for A as steps in single precision have it. lambda_max(M^-1 D)
- * is known by a few powers, which were up to 2.3 times too small of 123 bodies. Where slack is more than ROUGH_MOST,
- * half of what bounds of hard bodies are, or is seen to take more than half of this one, steps are in double precision.
+/* K >= A - slack M for A as steps in single precision have it, by mg->rough. lambda_max(M^-1 D) is known by a few
+ * powers, which were up to 2.3 times too small of 123 bodies. Where slack is more than ROUGH_MOST, half of what bounds
+ * of hard bodies are, or is seen to take more than half of this one, steps are in double precision.
  */
 #define ROUGH_MOST  0.03
 #define POWERS_MISS 3
@@ -209,7 +207,7 @@ static uz_status take_steps(bounding *x, uz_cg *cg, const uz_csc *K, uz_error *e
 static uz_status bound_below(uz_amg_info *info, coefficients *c, uz_cg *cg, const uz_csc *K, double most, int patience,
                              const uz_hooks *hooks, uz_error *err)
 {
-    const double slack = POWERS_MISS * FLT_EPSILON * sqrt(cg->mg->most) * most;
+    const double slack = POWERS_MISS * cg->mg->rough * most;
     const bounding begun = {.c = c,
                             .most = patience > 0 && patience < STEPS_MOST ? patience : STEPS_MOST,
                             .share = LEAST_SHARE / sqrt(cg->mg->most),

@@ -35,7 +35,13 @@ void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz
 /* room->v[first].x from room->v[first].b, with the grids from `first` on. */
 void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int first);
 
+/* room->v[0].b = down r (n), 0 at held dofs, down a power of two by which single precision holds it, which is returned:
+ * 0 of what is 0 or has numbers that are none. */
+double uz_brick_read(const uz_brick_grids *mg, const uz_multigrid_room *room, const double *r);
+
 /* As uz_multigrid_kind says. */
+uz_status uz_brick_step_roughly(const uz_multigrid *base, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                                void *ctx, uz_error *err);
 uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool *found, double *u, bool *held,
                          const double *p, const uz_limits *limits, const uz_stop *stop, uz_error *err);
 

@@ -60,9 +60,10 @@ typedef struct {
 } uz_brick_vectors;
 
 /* Room of a product, for each thread that may share it: two planes, the sums of a line, a line, and a plane as it was
- * before a step. */
+ * before a step; of each plane, what it adds to a sum. */
 typedef struct {
     int most;
+    double *of_plane;
     struct uz_brick_room {
         float *plane[2], *sums, *line, *edge;
     } of[UZ_ASIDE_MOST];
@@ -76,6 +77,8 @@ void uz_brick_step(const uz_brick_level *level, const uz_brick_vectors *v, const
                    float q);
 /* t = b - K x at free dofs. */
 void uz_brick_residual(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room);
+/* t = K x at free dofs, 0 at others; b is not read. Returns x't. */
+double uz_brick_curvature(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room);
 /* coarse->b = P't, 0 at its held dofs. */
 void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                        const uz_brick_vectors *coarse, const uz_brick_planes *room);

@@ -6,6 +6,7 @@
 #include "linalg/blas.h"
 #include "linalg/pieces.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -119,6 +120,27 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
                 return false;
         }
     }
+}
+
+/* Of the first grid. What rounding of the blocks does, E, comes with the sums w of a cell's corners, of which
+ * x'diag(ke)x is an eighth of the diagonal's, to at most the norm of 8 D^-1/2 E D^-1/2 times x'diag(K)x. What products
+ * round on the way goes up and down from node to node, where M^-1 leaves little of it: as much as half of FLT_EPSILON
+ * of x before and after is allowed for. */
+static double rounding_of(const uz_brick_grids *mg)
+{
+    const uz_brick_level *level = &mg->level[0];
+    double most = 0.0;
+    for (int p = 0; p < UZ_BRICK_PARITIES; p++) {
+        double square = 0.0;
+        for (int m = 0; m < 3; m++)
+            for (int l = 0; l < 3; l++) {
+                const int at = 9 * p + 3 * m + l;
+                const double off = UZ_BRICK_NODES * (mg->block[at] / mg->unit - (double)level->block[at]);
+                square += off * off / ((double)level->diagonal[m] * (double)level->diagonal[l]);
+            }
+        most = fmax(most, square);
+    }
+    return sqrt(most) + FLT_EPSILON;
 }
 
 /* ----------------------------------------------------------- what is held */
@@ -356,20 +378,34 @@ static void write_slab(void *ctx, int slab)
         }
 }
 
+double uz_brick_read(const uz_brick_grids *mg, const uz_multigrid_room *room, const double *r)
+{
+    const uz_brick_level *level = &mg->level[0];
+    const double most = uz_long_max(mg->base.n, r),
+                 down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 0.0;
+    passage p = {.mg = mg,
+                 .v = &room->v[0],
+                 .factor = down > 0.0 ? down : 1.0,
+                 .r = r,
+                 .slabs = uz_brick_slabs(level->cells[2] + 1, level->size, room->planes.most)};
+    uz_aside_share(read_slab, &p, p.slabs);
+    return down;
+}
+
 static uz_status apply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_room *room, double *z, const double *r,
                        uz_error *err)
 {
     const uz_brick_grids *mg = (const uz_brick_grids *)base;
     const uz_brick_level *level = &mg->level[0];
-    const double most = uz_long_max(base->n, r);
+    const double down = uz_brick_read(mg, room, r);
     (void)K;
     (void)err;
-    /* by a power of two, so that single precision holds it whatever the units are */
-    const double down = most > 0.0 && isfinite(most) ? ldexp(1.0, -ilogb(most)) : 1.0;
-    passage p = {mg, &room->v[0], down, r, z, uz_brick_slabs(level->cells[2] + 1, level->size, room->planes.most)};
-    uz_aside_share(read_slab, &p, p.slabs);
     uz_brick_cycle(mg, room, 0);
-    p.factor = 1.0 / (down * mg->unit);
+    passage p = {.mg = mg,
+                 .v = &room->v[0],
+                 .factor = 1.0 / ((down > 0.0 ? down : 1.0) * mg->unit),
+                 .z = z,
+                 .slabs = uz_brick_slabs(level->cells[2] + 1, level->size, room->planes.most)};
     uz_aside_share(write_slab, &p, p.slabs);
     return UZ_OK;
 }
@@ -477,6 +513,7 @@ static void free_multigrid(uz_multigrid *base)
 
 static const uz_multigrid_kind KIND = {.apply = apply,
                                        .multiply = multiply,
+                                       .step_roughly = uz_brick_step_roughly,
                                        .room = make_room,
                                        .free_room = free_room,
                                        .hold = hold,
@@ -528,6 +565,7 @@ uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t m
     if (status == UZ_OK) {
         mg->n_coarsest = list_coarsest(NULL, &mg->level[mg->base.levels - 1]);
         mg->base.most = uz_brick_bound_on_cycle(&mg->level[0].smoother);
+        mg->base.rough = rounding_of(mg);
         mg->base.bytes += sizeof *mg + 8 * (size_t)(mg->n_coarsest * mg->n_coarsest);
         status = uz_brick_factor_coarsest(&mg->coarsest, mg, mg->inverse[mg->base.levels - 1], NULL, err);
     }

@@ -17,7 +17,8 @@ bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, si
 {
     const int64_t plane = 3 * level->plane + 2 * UZ_BRICK_PAD, sums = FIELDS * line_room(level->stride),
                   line = 2 * (level->stride + UZ_BRICK_PAD);
-    bool ok = true;
+    bool ok = (room->of_plane = uz_alloc_zero(level->cells[2] + 1, sizeof(double)));
+    *bytes += 8 * (size_t)(level->cells[2] + 1);
     room->most = uz_aside_count();
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_room *of = &room->of[part];
@@ -39,6 +40,7 @@ void uz_brick_planes_clear(uz_brick_planes *room)
         for (size_t k = 0; k < sizeof all / sizeof all[0]; k++)
             free(all[k]);
     }
+    free(room->of_plane);
     memset(room, 0, sizeof *room);
 }
 
@@ -80,11 +82,13 @@ __attribute__((noinline)) static void layer_narrow(const uz_brick_level *level, 
     layer(level, sums, x, near, far);
 }
 
-typedef enum { STEP, RESIDUAL } task;
+typedef enum { STEP, RESIDUAL, CURVATURE } task;
 
-/* Numbers of a plane of one component. */
-static inline __attribute__((always_inline)) void finish(const uz_brick_vectors *v, int64_t at, int64_t n,
-                                                         const float *Kx, task what, float p, float q)
+typedef double wide_lanes __attribute__((vector_size(WIDTH * sizeof(double))));
+
+/* Numbers of a plane of one component, registers of them. Returns what they add to a sum. */
+static inline __attribute__((always_inline)) double finish(const uz_brick_vectors *v, int64_t at, int64_t n,
+                                                           const float *Kx, task what, float p, float q)
 {
     float *restrict x = v->x + at, *restrict d = v->d + at, *restrict t = v->t + at;
     const float *restrict b = v->b + at, *restrict inverse = v->inverse + at;
@@ -94,18 +98,27 @@ static inline __attribute__((always_inline)) void finish(const uz_brick_vectors 
     }
     for (int64_t i = 0; what == RESIDUAL && i < n; i++)
         t[i] = inverse[i] != 0.0F ? b[i] - Kx[i] : 0.0F;
+    if (what != CURVATURE)
+        return 0.0;
+    for (int64_t i = 0; i < n; i++)
+        t[i] = inverse[i] != 0.0F ? Kx[i] : 0.0F;
+    wide_lanes sums = {0.0};
+    for (int64_t i = 0; i < n; i += WIDTH)
+        sums += __builtin_convertvector(*(const lanes *)(x + i), wide_lanes) *
+                __builtin_convertvector(*(const lanes *)(t + i), wide_lanes);
+    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 }
 
-UZ_AVX2_FMA static void finish_wide(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what,
-                                    float p, float q)
+UZ_AVX2_FMA static double finish_wide(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what,
+                                      float p, float q)
 {
-    finish(v, at, n, Kx, what, p, q);
+    return finish(v, at, n, Kx, what, p, q);
 }
 
-static void finish_narrow(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what, float p,
-                          float q)
+static double finish_narrow(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what, float p,
+                            float q)
 {
-    finish(v, at, n, Kx, what, p, q);
+    return finish(v, at, n, Kx, what, p, q);
 }
 
 /* A sweep as the threads that share it see it. */
@@ -155,15 +168,17 @@ static void sweep_slab(void *ctx, int slab)
                   end = uz_brick_slab(level->cells[2] + 1, slab + 1, s->slabs);
     const float *above = s->what == STEP && slab + 1 < s->slabs ? s->room->of[slab + 1].edge : NULL;
     float *planes[2] = {room->plane[0], room->plane[1]};
-    if (s->what == RESIDUAL)
+    if (s->what != STEP)
         begin_slab(ctx, slab);
     for (int64_t k = first; k < end; k++) {
         if (k < level->cells[2])
             add_layer(s, room, k, k + 1 == end ? above : NULL, planes[0], planes[1]);
+        double sum = 0.0;
         for (int m = 0; m < COMPONENTS; m++)
-            (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(s->v, m * level->size + k * level->plane,
-                                                                  level->plane, planes[0] + m * level->plane, s->what,
-                                                                  s->p, s->q);
+            sum += (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(s->v, m * level->size + k * level->plane,
+                                                                         level->plane, planes[0] + m * level->plane,
+                                                                         s->what, s->p, s->q);
+        s->room->of_plane[k] = sum;
         float *const done = planes[0];
         planes[0] = planes[1];
         planes[1] = done;
@@ -182,4 +197,14 @@ void uz_brick_residual(const uz_brick_level *level, const uz_brick_vectors *v, c
 {
     sweep s = {level, v, room, RESIDUAL, 0.0F, 0.0F, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
     uz_aside_share(sweep_slab, &s, s.slabs);
+}
+
+double uz_brick_curvature(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room)
+{
+    sweep s = {level, v, room, CURVATURE, 0.0F, 0.0F, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
+    double sum = 0.0;
+    uz_aside_share(sweep_slab, &s, s.slabs);
+    for (int64_t k = 0; k <= level->cells[2]; k++)
+        sum += room->of_plane[k];
+    return sum;
 }

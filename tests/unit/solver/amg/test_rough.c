@@ -1,6 +1,7 @@
 /* Conjugate gradients that are looked at on their way, and those in single precision, against what they stand for.
  * not under ThreadSanitizer: nothing here knows of threads */
 #include "amg_pair.h"
+#include "cg_steps.h"
 
 /* What a solve ends with: the cycles that it took, *last as it tells it, and the same of the true residual. */
 static int64_t cycles_of_solve(double *last, double *actual, pair *p, bool unchecked)
@@ -179,63 +180,11 @@ TEST(a_solve_is_looked_at_on_its_way)
     close_pair(&p);
 }
 
-enum { TOLD_MOST = 12 };
-typedef struct {
-    double along[TOLD_MOST], ratio[TOLD_MOST], first;
-    int count;
-} told;
-
-static bool listen(void *ctx, double along, double before, double after)
-{
-    told *t = ctx;
-    t->first = t->count == 0 ? before : t->first;
-    t->along[t->count] = along;
-    t->ratio[t->count++] = after / before;
-    return t->count < TOLD_MOST;
-}
-
-/* The same steps from the definition. */
-static void step_along(told *t, pair *p, const double *start)
-{
-    const int64_t n = p->K.cols;
-    double *r = vector(n), *z = vector(n), *along = vector(n), *q = vector(n);
-    uz_error err = {0};
-    memcpy(r, start, (size_t)n * sizeof *r);
-    CHECK(uz_multigrid_apply(p->amg->mg, &p->K, p->cg.room, z, r, &err) == UZ_OK);
-    memcpy(along, z, (size_t)n * sizeof *z);
-    double square = dot(r, z, n);
-    for (bool go_on = true; go_on;) {
-        memset(q, 0, (size_t)n * sizeof *q);
-        uz_csc_symv(q, &p->K, 1.0, along);
-        const double alpha = square / dot(along, q, n), last = square;
-        for (int64_t j = 0; j < n; j++)
-            r[j] -= alpha * q[j];
-        CHECK(uz_multigrid_apply(p->amg->mg, &p->K, p->cg.room, z, r, &err) == UZ_OK);
-        square = dot(r, z, n);
-        for (int64_t j = 0; j < n; j++)
-            along[j] = z[j] + square / last * along[j];
-        go_on = listen(t, alpha, last, square);
-    }
-    free(r);
-    free(z);
-    free(along);
-    free(q);
-}
-
 TEST(steps_in_single_precision_are_those_of_conjugate_gradients)
 {
     pair p = open_brick((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3);
     double *r = random_vector(p.K.cols, 5);
-    told single = {.count = 0}, twice = {.count = 0};
-    uz_error err = {0};
-    CHECK(uz_aggregates_kind.step_roughly(p.amg->mg, p.cg.room, r, listen, &single, &err) == UZ_OK);
-    step_along(&twice, &p, r);
-    CHECK_INT(single.count, TOLD_MOST);
-    CHECK_REL(single.first, twice.first, 1e-5);
-    for (int k = 0; k < TOLD_MOST; k++) {
-        CHECK_REL(single.along[k], twice.along[k], 1e-3);
-        CHECK_REL(single.ratio[k], twice.ratio[k], 1e-3);
-    }
+    check_steps(p.amg->mg, &p.K, p.cg.room, r);
     free(r);
     close_pair(&p);
 }

@@ -1,5 +1,5 @@
 /* What threads compute of a box in slabs is what one computes, to the last bit: its diagonal, the products, a cycle, a
- * start on coarser grids, conjugate gradients, and what a certificate has of it. */
+ * start on coarser grids, conjugate gradients in either precision, and what a certificate has of it. */
 #include "brick/brick.h"
 #include "certificate/brick_product.h"
 #include "core/aside.h"
@@ -35,9 +35,24 @@ static double number(int64_t j)
     return (double)(j * 7919 % 1000 - 500);
 }
 
+/* What the first steps of conjugate gradients in single precision tell. */
+enum { TOLD = 4 };
+typedef struct {
+    double *to;
+    int count;
+} told;
+
+static bool tell(void *ctx, double along, double before, double after)
+{
+    told *t = ctx;
+    const double all[] = {along, before, after};
+    memcpy(t->to + 3 * t->count, all, sizeof all);
+    return ++t->count < TOLD;
+}
+
 TEST(threads_give_the_same_bits)
 {
-    enum { VECTORS = 6 };
+    enum { VECTORS = 7 };
     uz_scene scene;
     uz_body_model cells = make_cells(&scene);
     const uz_stop never = {.hooks = NULL, .deadline = INFINITY};
@@ -85,6 +100,9 @@ TEST(threads_give_the_same_bits)
         const uz_cg_stop stop = {.relative = SANITIZED ? 1e-2 : 1e-6, .max_iterations = 50, .deadline = INFINITY};
         CHECK_INT(uz_cg_solve(&info, y[5], &cg, &K, x, &stop, &err), UZ_OK);
         CHECK(info.met);
+        told t = {.to = y[6]};
+        CHECK_INT(mg->kind->step_roughly(mg, cg.room, x, tell, &t, &err), UZ_OK);
+        CHECK_INT(t.count, TOLD);
         uz_cg_clear(&cg);
         uz_multigrid_free(mg);
         CHECK_INT(uz_aside_used(), threads);
