@@ -59,22 +59,24 @@ typedef struct {
     const float *inverse;
 } uz_brick_vectors;
 
-/* Room of a product, for each thread that may share it: two planes, the sums of a line, a line, and a plane as it was
- * before a step; of each plane, what it adds to a sum. */
+/* Room of sweeps, for each thread that may share them: of each step two planes of sums; the sums of a line, a line, and
+ * of planes beside a slab what its steps make of x and d, x first; of each plane, what it adds to a sum. */
 typedef struct {
     int most;
     double *of_plane;
     struct uz_brick_room {
-        float *plane[2], *sums, *line, *edge;
+        float *plane[UZ_BRICK_DEGREE_MOST][2], *sums, *line, *beside;
     } of[UZ_ASIDE_MOST];
 } uz_brick_planes;
 /* false: no memory; clear it all the same. *bytes: of it. */
 bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, size_t *bytes);
 void uz_brick_planes_clear(uz_brick_planes *room);
 
-/* One step of a polynomial smoother: d = p d + q inverse (b - K x), x += d. */
-void uz_brick_step(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room, float p,
-                   float q);
+/* x by the smoother from 0, t = b - K x at free dofs. */
+void uz_brick_smooth_down(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room);
+/* x += P coarse (x of the next grid), then the smoother from there. */
+void uz_brick_smooth_up(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
+                        const float *coarse, const uz_brick_planes *room);
 /* t = b - K x at free dofs. */
 void uz_brick_residual(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room);
 /* t = K x at free dofs, 0 at others; b is not read. Returns x't. */
@@ -85,5 +87,8 @@ void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, 
 /* x += P coarse->x at free dofs. */
 void uz_brick_prolong(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                       const uz_brick_vectors *coarse, const uz_brick_planes *room);
+/* The same of plane k, which begins at `plane`, its components so many numbers apart; inverse, coarse: of all. */
+void uz_brick_prolong_plane(const uz_brick_level *level, const uz_brick_level *next, const float *inverse,
+                            const float *coarse, float *line, int64_t k, float *plane, int64_t apart);
 
 #endif

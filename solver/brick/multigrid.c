@@ -280,45 +280,18 @@ static void solve_coarsest(const uz_brick_grids *mg, const uz_multigrid_room *ro
                 }
 }
 
-/* The first step of a smoother that begins at x = 0. */
-typedef struct {
-    const uz_brick_vectors *v;
-    float q;
-} first_step;
-
-static void take_first_step(void *ctx, int64_t begin, int64_t end)
-{
-    const first_step *s = ctx;
-    const float q = s->q;
-    float *restrict x = s->v->x, *restrict d = s->v->d;
-    const float *restrict b = s->v->b, *restrict inverse = s->v->inverse;
-    for (int64_t i = begin; i < end; i++)
-        x[i] = d[i] = q * inverse[i] * b[i];
-}
-
 void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int first)
 {
     const int last = mg->base.levels - 1;
+    const uz_brick_level *level = mg->level;
+    const uz_brick_vectors *v = room->v;
     for (int l = first; l < last; l++) {
-        const uz_brick_level *level = &mg->level[l];
-        const uz_brick_vectors *v = &room->v[l];
-        const uz_brick_smoother *s = &level->smoother;
-        first_step begin = {v, s->q[0]};
-        uz_by_pieces(take_first_step, &begin, 3 * level->size);
-        for (int k = 1; k < s->degree; k++)
-            uz_brick_step(level, v, &room->planes, s->p[k], s->q[k]);
-        uz_brick_residual(level, v, &room->planes);
-        uz_brick_restrict(level, level + 1, v, v + 1, &room->planes);
+        uz_brick_smooth_down(&level[l], &v[l], &room->planes);
+        uz_brick_restrict(&level[l], &level[l + 1], &v[l], &v[l + 1], &room->planes);
     }
     solve_coarsest(mg, room);
-    for (int l = last - 1; l >= first; l--) {
-        const uz_brick_level *level = &mg->level[l];
-        const uz_brick_vectors *v = &room->v[l];
-        const uz_brick_smoother *s = &level->smoother;
-        uz_brick_prolong(level, level + 1, v, v + 1, &room->planes);
-        for (int k = 0; k < s->degree; k++)
-            uz_brick_step(level, v, &room->planes, s->p[k], s->q[k]);
-    }
+    for (int l = last - 1; l >= first; l--)
+        uz_brick_smooth_up(&level[l], &level[l + 1], &v[l], v[l + 1].x, &room->planes);
 }
 
 /* A vector of dofs on its way to the first grid, or back. */
@@ -525,7 +498,8 @@ double uz_brick_predict_bytes(const uz_brick *brick)
 {
     const double stride = (double)uz_brick_stride(brick->cells[0]);
     const double padded = 3.0 * stride * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
-    return 4.0 * 5.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS + 48.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
+    return 4.0 * 5.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS +
+           144.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)

@@ -6,7 +6,7 @@
 #include <sys/mman.h>
 
 /* Cells along each side of a cube, the vectors of which are more than most cores have for themselves. */
-enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40 };
+enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40, DEGREE = 2 };
 
 #define ENOUGH_S 0.004
 /* What is assumed where there is no memory: a core of 2022. */
@@ -21,7 +21,7 @@ typedef struct {
 static void smooth(void *ctx)
 {
     const smoothing *x = ctx;
-    uz_brick_step(x->level, &x->v, x->planes, 0.1F, 0.1F);
+    uz_brick_smooth_down(x->level, &x->v, x->planes);
 }
 
 static double time_step(const uz_brick_level *level, uz_brick_planes *planes, float *room)
@@ -36,13 +36,17 @@ static double time_step(const uz_brick_level *level, uz_brick_planes *planes, fl
     planes->most = 1; /* seconds are those of this thread */
     const double least = uz_least_seconds(smooth, &x, 2, REPEATS, ENOUGH_S);
     planes->most = most;
-    return least / (3.0 * NODES * NODES * NODES);
+    return least / (DEGREE * 3.0 * NODES * NODES * NODES);
 }
 
 double uz_brick_rate(void)
 {
     const int64_t stride = uz_brick_stride(CELLS), plane = stride * NODES + UZ_BRICK_PAD;
-    uz_brick_level level = {.cells = {CELLS, CELLS, CELLS}, .stride = stride, .plane = plane, .size = plane * NODES};
+    uz_brick_level level = {.cells = {CELLS, CELLS, CELLS},
+                            .stride = stride,
+                            .plane = plane,
+                            .size = plane * NODES,
+                            .smoother = {.degree = DEGREE, .p = {0.0F, 0.1F}, .q = {0.1F, 0.1F}}};
     const size_t bytes = 4 * (size_t)uz_brick_numbers(&level) * sizeof(float);
     double rate = ASSUMED_S;
     size_t ignored = 0;

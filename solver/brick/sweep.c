@@ -1,7 +1,10 @@
 /* sweep.c: products on a grid, with what follows each plane of nodes done while it is in the cache.
  *
  * Once both layers of cells beside a plane of nodes are through, K x is known there, and x there is not read again: a
- * step of the smoother can change it on the spot. Threads share a sweep in slabs of planes. */
+ * step of the smoother can change it on the spot. The next step follows a plane behind, so that all steps of a
+ * smoother, with what comes before and after, pass through the vectors once (a wavefront: M. Wittmann, G. Hager, G.
+ * Wellein, "Multicore-aware parallel temporal blocking of stencil codes", 2010). Threads share a sweep in slabs of
+ * planes. What a slab needs of planes beside it, it computes once more for itself, with the same bits. */
 #include "brick/levels.h"
 
 #include "core/alloc.h"
@@ -13,21 +16,26 @@
 #define REAL float
 #include "brick/line.inc"
 
+/* Planes beside a slab, below and above, that as many steps reach. */
+enum { BESIDE = 2 * UZ_BRICK_DEGREE_MOST };
+/* A slab has so many for each stage of a sweep, as it does planes beside it once more. */
+enum { PLANES_OF_STAGE = 4 };
+
 bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, size_t *bytes)
 {
     const int64_t plane = 3 * level->plane + 2 * UZ_BRICK_PAD, sums = FIELDS * line_room(level->stride),
-                  line = 2 * (level->stride + UZ_BRICK_PAD);
+                  line = 2 * (level->stride + UZ_BRICK_PAD), beside = 2 * BESIDE * 3 * level->plane + 2 * UZ_BRICK_PAD;
     bool ok = (room->of_plane = uz_alloc_zero(level->cells[2] + 1, sizeof(double)));
     *bytes += 8 * (size_t)(level->cells[2] + 1);
     room->most = uz_aside_count();
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_room *of = &room->of[part];
-        ok = (of->plane[0] = uz_alloc_zero(plane, sizeof(float))) && ok;
-        ok = (of->plane[1] = uz_alloc_zero(plane, sizeof(float))) && ok;
+        for (int k = 0; k < 2 * UZ_BRICK_DEGREE_MOST; k++)
+            ok = (of->plane[k / 2][k % 2] = uz_alloc_zero(plane, sizeof(float))) && ok;
         ok = (of->sums = uz_alloc_zero(sums, sizeof(float))) && ok;
         ok = (of->line = uz_alloc_zero(line, sizeof(float))) && ok;
-        ok = (room->most < 2 || (of->edge = uz_alloc_zero(plane, sizeof(float)))) && ok;
-        *bytes += 4 * (size_t)((room->most < 2 ? 2 : 3) * plane + sums + line);
+        ok = (room->most < 2 || (of->beside = uz_alloc_zero(beside, sizeof(float)))) && ok;
+        *bytes += 4 * (size_t)(2 * UZ_BRICK_DEGREE_MOST * plane + sums + line + (room->most < 2 ? 0 : beside));
     }
     return ok;
 }
@@ -36,9 +44,11 @@ void uz_brick_planes_clear(uz_brick_planes *room)
 {
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_room *of = &room->of[part];
-        float *all[] = {of->plane[0], of->plane[1], of->sums, of->line, of->edge};
-        for (size_t k = 0; k < sizeof all / sizeof all[0]; k++)
-            free(all[k]);
+        for (int k = 0; k < 2 * UZ_BRICK_DEGREE_MOST; k++)
+            free(of->plane[k / 2][k % 2]);
+        free(of->sums);
+        free(of->line);
+        free(of->beside);
     }
     free(room->of_plane);
     memset(room, 0, sizeof *room);
@@ -82,128 +92,254 @@ __attribute__((noinline)) static void layer_narrow(const uz_brick_level *level, 
     layer(level, sums, x, near, far);
 }
 
-typedef enum { STEP, RESIDUAL, CURVATURE } task;
+/* What is done to a plane: x = d = q inverse b; of a polynomial, x += d, its first step, d = q inverse (b - K x), and
+ * the others, d = p d + the same; t = b - K x and t = K x at free dofs. */
+typedef enum { ZERO_STEP, FIRST_STEP, STEP, RESIDUAL, CURVATURE } task;
+typedef struct {
+    task what;
+    float p, q;
+} stage;
 
-typedef double wide_lanes __attribute__((vector_size(WIDTH * sizeof(double))));
+typedef int32_t masks __attribute__((vector_size(32)));
+typedef float four_singles __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double fours __attribute__((vector_size(32)));
 
-/* Numbers of a plane of one component, registers of them. Returns what they add to a sum. */
-static inline __attribute__((always_inline)) double finish(const uz_brick_vectors *v, int64_t at, int64_t n,
-                                                           const float *Kx, task what, float p, float q)
+/* Numbers of a plane of one component, registers of them. Returns x't of a curvature. */
+static inline __attribute__((always_inline)) double finish(const uz_brick_vectors *v, int64_t n, const float *Kx,
+                                                           const stage *s)
 {
-    float *restrict x = v->x + at, *restrict d = v->d + at, *restrict t = v->t + at;
-    const float *restrict b = v->b + at, *restrict inverse = v->inverse + at;
-    for (int64_t i = 0; what == STEP && i < n; i++) {
+    float *restrict x = v->x, *restrict d = v->d, *restrict t = v->t;
+    const float *restrict b = v->b, *restrict inverse = v->inverse, p = s->p, q = s->q;
+    for (int64_t i = 0; s->what == ZERO_STEP && i < n; i++)
+        x[i] = d[i] = q * inverse[i] * b[i];
+    for (int64_t i = 0; s->what == FIRST_STEP && i < n; i++) {
+        d[i] = q * inverse[i] * (b[i] - Kx[i]);
+        x[i] += d[i];
+    }
+    for (int64_t i = 0; s->what == STEP && i < n; i++) {
         d[i] = p * d[i] + q * inverse[i] * (b[i] - Kx[i]);
         x[i] += d[i];
     }
-    for (int64_t i = 0; what == RESIDUAL && i < n; i++)
-        t[i] = inverse[i] != 0.0F ? b[i] - Kx[i] : 0.0F;
-    if (what != CURVATURE)
+    for (int64_t i = 0; s->what == RESIDUAL && i < n; i += WIDTH) {
+        const lanes left = *(const lanes *)(b + i) - *(const lanes *)(Kx + i);
+        *(lanes *)(t + i) = (lanes)((masks)left & (*(const lanes *)(inverse + i) != 0.0F));
+    }
+    if (s->what != CURVATURE)
         return 0.0;
-    for (int64_t i = 0; i < n; i++)
-        t[i] = inverse[i] != 0.0F ? Kx[i] : 0.0F;
-    wide_lanes sums = {0.0};
-    for (int64_t i = 0; i < n; i += WIDTH)
-        sums += __builtin_convertvector(*(const lanes *)(x + i), wide_lanes) *
-                __builtin_convertvector(*(const lanes *)(t + i), wide_lanes);
-    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+    fours sums[2] = {{0.0}};
+    for (int64_t i = 0; i < n; i += WIDTH) {
+        *(lanes *)(t + i) = (lanes)(*(const masks *)(Kx + i) & (*(const lanes *)(inverse + i) != 0.0F));
+        for (int half = 0; half < 2; half++)
+            sums[half] += __builtin_convertvector(*(const four_singles *)(x + i + 4 * half), fours) *
+                          __builtin_convertvector(*(const four_singles *)(t + i + 4 * half), fours);
+    }
+    const fours all = sums[0] + sums[1];
+    return (all[0] + all[1]) + (all[2] + all[3]);
 }
 
-UZ_AVX2_FMA static double finish_wide(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what,
-                                      float p, float q)
+__attribute__((noinline)) UZ_AVX2_FMA static double finish_wide(const uz_brick_vectors *v, int64_t n, const float *Kx,
+                                                                const stage *s)
 {
-    return finish(v, at, n, Kx, what, p, q);
+    return finish(v, n, Kx, s);
 }
 
-static double finish_narrow(const uz_brick_vectors *v, int64_t at, int64_t n, const float *Kx, task what, float p,
-                            float q)
+__attribute__((noinline)) static double finish_narrow(const uz_brick_vectors *v, int64_t n, const float *Kx,
+                                                      const stage *s)
 {
-    return finish(v, at, n, Kx, what, p, q);
+    return finish(v, n, Kx, s);
 }
 
-/* A sweep as the threads that share it see it. */
+/* A sweep as the threads that share it see it. Stage 0 is of planes alone: x += P coarse, a ZERO_STEP, or, where x is
+ * not changed, nothing. */
 typedef struct {
-    const uz_brick_level *level;
+    const uz_brick_level *level, *next;
     const uz_brick_vectors *v;
     const uz_brick_planes *room;
-    task what;
-    float p, q;
+    const float *coarse; /* NULL: nothing is added */
+    stage first, of[UZ_BRICK_DEGREE_MOST];
+    int stages; /* beside the first */
+    bool changes, from_zero;
     int slabs;
 } sweep;
 
-/* The layer of cells above plane k. edge: the plane above it as it was; NULL: it is so in x. */
-static void add_layer(const sweep *s, const struct uz_brick_room *room, int64_t k, const float *edge, float *near,
-                      float *far)
+typedef struct {
+    const sweep *s;
+    struct uz_brick_room room;
+    int64_t begin, end; /* its planes */
+} slab;
+
+static slab slab_of(const sweep *s, int part)
 {
-    const uz_brick_level *level = s->level;
-    const float *x = s->v->x + k * level->plane;
-    const nodes of = {x, edge ? edge : x + level->plane, level->size, edge ? level->plane : level->size};
-    (uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow)(level, room->sums, &of, near, far);
+    const int64_t planes = s->level->cells[2] + 1;
+    return (slab){s, s->room->of[part], uz_brick_slab(planes, part, s->slabs),
+                  uz_brick_slab(planes, part + 1, s->slabs)};
 }
 
-/* The first plane's sums from the layer below it, which a step of the slab there is about to change; what that slab
- * reads of this one. */
-static void begin_slab(void *ctx, int slab)
+/* Planes that a stage has to reach, so that the last one has those of the slab. */
+static int64_t lowest(const slab *own, int number)
 {
-    const sweep *s = ctx;
-    const uz_brick_level *level = s->level;
-    const struct uz_brick_room *room = &s->room->of[slab];
-    const int64_t first = uz_brick_slab(level->cells[2] + 1, slab, s->slabs);
-    if (first == 0) {
-        memset(room->plane[0], 0, (size_t)(3 * level->plane) * sizeof(float));
-        return;
+    const int64_t k = own->begin - (own->s->stages - number);
+    return k > 0 ? k : 0;
+}
+
+static int64_t highest(const slab *own, int number)
+{
+    const int64_t k = own->end - 1 + (own->s->stages - number), last = own->s->level->cells[2];
+    return k < last ? k : last;
+}
+
+/* Where plane k of x (0) or d (1) stands for this slab, and how far apart its components are. */
+static float *plane_of(int64_t *apart, const slab *own, int vector, int64_t k)
+{
+    const sweep *s = own->s;
+    const int64_t plane = s->level->plane;
+    *apart = s->level->size;
+    if (!s->changes || (k >= own->begin && k < own->end))
+        return (vector == 0 ? s->v->x : s->v->d) + k * plane;
+    *apart = plane;
+    const int64_t place =
+        k < own->begin ? UZ_BRICK_DEGREE_MOST - (own->begin - k) : UZ_BRICK_DEGREE_MOST + k - own->end;
+    return own->room.beside + (vector * BESIDE + place) * 3 * plane;
+}
+
+/* x beside the slab as it is before others change it there. */
+static void copy_beside(void *ctx, int part)
+{
+    const slab own = slab_of(ctx, part);
+    const sweep *s = own.s;
+    for (int64_t k = lowest(&own, 0); k <= highest(&own, 0); k++) {
+        int64_t apart;
+        float *x = plane_of(&apart, &own, 0, k);
+        for (int m = 0; (k < own.begin || k >= own.end) && m < COMPONENTS; m++)
+            memcpy(x + m * apart, s->v->x + m * s->level->size + k * s->level->plane,
+                   (size_t)s->level->plane * sizeof(float));
     }
-    add_layer(s, room, first - 1, NULL, room->plane[1], room->plane[0]);
-    for (int m = 0; s->what == STEP && m < COMPONENTS; m++)
-        memcpy(room->edge + m * level->plane, s->v->x + m * level->size + first * level->plane,
-               (size_t)level->plane * sizeof(float));
 }
 
-static void sweep_slab(void *ctx, int slab)
+/* The layer of cells above plane k. */
+static void add_layer(const slab *own, int64_t k, float *near, float *far)
 {
-    const sweep *s = ctx;
-    const uz_brick_level *level = s->level;
-    const struct uz_brick_room *room = &s->room->of[slab];
-    const int64_t first = uz_brick_slab(level->cells[2] + 1, slab, s->slabs),
-                  end = uz_brick_slab(level->cells[2] + 1, slab + 1, s->slabs);
-    const float *above = s->what == STEP && slab + 1 < s->slabs ? s->room->of[slab + 1].edge : NULL;
-    float *planes[2] = {room->plane[0], room->plane[1]};
-    if (s->what != STEP)
-        begin_slab(ctx, slab);
-    for (int64_t k = first; k < end; k++) {
-        if (k < level->cells[2])
-            add_layer(s, room, k, k + 1 == end ? above : NULL, planes[0], planes[1]);
-        double sum = 0.0;
-        for (int m = 0; m < COMPONENTS; m++)
-            sum += (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(s->v, m * level->size + k * level->plane,
-                                                                         level->plane, planes[0] + m * level->plane,
-                                                                         s->what, s->p, s->q);
+    nodes x;
+    x.near = plane_of(&x.apart_near, own, 0, k);
+    x.far = plane_of(&x.apart_far, own, 0, k + 1);
+    (uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow)(own->s->level, own->room.sums, &x, near, far);
+}
+
+static void finish_plane(const slab *own, int64_t k, const float *Kx, const stage *what)
+{
+    const sweep *s = own->s;
+    const int64_t plane = s->level->plane;
+    int64_t apart;
+    float *x = plane_of(&apart, own, 0, k), *d = s->changes ? plane_of(&apart, own, 1, k) : NULL;
+    double sum = 0.0;
+    for (int m = 0; m < COMPONENTS; m++) {
+        const int64_t at = m * s->level->size + k * plane;
+        const uz_brick_vectors v = {.x = x + m * apart,
+                                    .d = d ? d + m * apart : NULL,
+                                    .b = what->what == CURVATURE ? NULL : s->v->b + at,
+                                    .t = s->v->t + at,
+                                    .inverse = s->v->inverse + at};
+        sum += (uz_cpu_has_avx2_fma() ? finish_wide : finish_narrow)(&v, plane, Kx ? Kx + m * plane : NULL, what);
+    }
+    if (what->what == CURVATURE)
         s->room->of_plane[k] = sum;
-        float *const done = planes[0];
-        planes[0] = planes[1];
-        planes[1] = done;
+}
+
+static void begin_plane(const slab *own, int64_t k)
+{
+    const sweep *s = own->s;
+    int64_t apart;
+    float *x = plane_of(&apart, own, 0, k);
+    if (s->from_zero)
+        finish_plane(own, k, NULL, &s->first);
+    else if (s->coarse)
+        uz_brick_prolong_plane(s->level, s->next, s->v->inverse, s->coarse, own->room.line, k, x, apart);
+}
+
+/* A stage that has come to the layer above plane k. */
+static void go_on(slab *own, int number, int64_t k)
+{
+    const sweep *s = own->s;
+    float **sums = own->room.plane[number - 1], *const done = sums[0];
+    const int64_t low = lowest(own, number);
+    if (k + 1 < low || k > highest(own, number) || k < 0)
+        return;
+    if (k == 0)
+        memset(sums[0], 0, (size_t)(3 * s->level->plane) * sizeof(float));
+    if (k < s->level->cells[2])
+        add_layer(own, k, sums[0], sums[1]);
+    if (k >= low)
+        finish_plane(own, k, sums[0], &s->of[number - 1]);
+    sums[0] = sums[1];
+    sums[1] = done;
+}
+
+static void sweep_slab(void *ctx, int part)
+{
+    slab own = slab_of(ctx, part);
+    const int stages = own.s->stages;
+    for (int64_t k = lowest(&own, 0); k < own.end + stages; k++) {
+        if (k <= highest(&own, 0))
+            begin_plane(&own, k);
+        for (int number = 1; number <= stages; number++)
+            go_on(&own, number, k - number);
     }
 }
 
-void uz_brick_step(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room, float p,
-                   float q)
+static void share(sweep *s)
 {
-    sweep s = {level, v, room, STEP, p, q, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
-    uz_aside_share(begin_slab, &s, s.slabs);
-    uz_aside_share(sweep_slab, &s, s.slabs);
+    const int64_t planes = s->level->cells[2] + 1;
+    s->slabs = uz_brick_slabs(planes, s->level->size, s->room->most);
+    while (s->slabs > 1 && s->slabs * PLANES_OF_STAGE * s->stages > planes)
+        s->slabs--;
+    if (s->changes && !s->from_zero && s->slabs > 1)
+        uz_aside_share(copy_beside, s, s->slabs);
+    uz_aside_share(sweep_slab, s, s->slabs);
+}
+
+void uz_brick_smooth_down(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room)
+{
+    const uz_brick_smoother *by = &level->smoother;
+    sweep s = {.level = level,
+               .v = v,
+               .room = room,
+               .first = {ZERO_STEP, 0.0F, by->q[0]},
+               .stages = by->degree,
+               .changes = true,
+               .from_zero = true};
+    for (int k = 1; k < by->degree; k++)
+        s.of[k - 1] = (stage){STEP, by->p[k], by->q[k]};
+    s.of[by->degree - 1] = (stage){RESIDUAL, 0.0F, 0.0F};
+    share(&s);
+}
+
+void uz_brick_smooth_up(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
+                        const float *coarse, const uz_brick_planes *room)
+{
+    const uz_brick_smoother *by = &level->smoother;
+    sweep s = {
+        .level = level, .next = next, .v = v, .room = room, .coarse = coarse, .stages = by->degree, .changes = true};
+    for (int k = 0; k < by->degree; k++)
+        s.of[k] = (stage){k == 0 ? FIRST_STEP : STEP, by->p[k], by->q[k]};
+    share(&s);
+}
+
+/* A stage that changes no x. */
+static void look_at(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room, task what)
+{
+    sweep s = {.level = level, .v = v, .room = room, .of = {{what, 0.0F, 0.0F}}, .stages = 1};
+    share(&s);
 }
 
 void uz_brick_residual(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room)
 {
-    sweep s = {level, v, room, RESIDUAL, 0.0F, 0.0F, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
-    uz_aside_share(sweep_slab, &s, s.slabs);
+    look_at(level, v, room, RESIDUAL);
 }
 
 double uz_brick_curvature(const uz_brick_level *level, const uz_brick_vectors *v, const uz_brick_planes *room)
 {
-    sweep s = {level, v, room, CURVATURE, 0.0F, 0.0F, uz_brick_slabs(level->cells[2] + 1, level->size, room->most)};
     double sum = 0.0;
-    uz_aside_share(sweep_slab, &s, s.slabs);
+    look_at(level, v, room, CURVATURE);
     for (int64_t k = 0; k <= level->cells[2]; k++)
         sum += room->of_plane[k];
     return sum;

@@ -128,32 +128,30 @@ static inline __attribute__((always_inline)) void spread(float *restrict out, co
     }
 }
 
-/* To the fine planes from `first` to `end`. */
-static inline __attribute__((always_inline)) void prolong_all(const transfer *t, float *line, int64_t first,
-                                                              int64_t end)
+/* To plane k of the fine grid, x there, whose components begin so many numbers apart. */
+static inline __attribute__((always_inline)) void prolong_any(const uz_brick_level *f, const uz_brick_level *c,
+                                                              const float *inverse, const float *coarse, float *line,
+                                                              int64_t k, float *plane, int64_t apart)
 {
-    const uz_brick_level *f = t->f, *c = t->c;
-    const uz_brick_vectors *v = t->v, *coarse = t->coarse;
     const uz_brick_axis *to = f->to;
     float *const out = line + f->stride + UZ_BRICK_PAD;
     for (int m = 0; m < 3; m++)
-        for (int64_t k = first; k < end; k++)
-            for (int64_t j = 0; j <= f->cells[1]; j++) {
-                const int64_t at = m * f->size + k * f->plane + j * f->stride;
-                const float *restrict inverse = v->inverse + at, z = to[2].beyond[k], y = to[1].beyond[j];
-                const float share[4] = {(1.0F - y) * (1.0F - z), y * (1.0F - z), (1.0F - y) * z, y * z};
-                float *restrict x = v->x + at;
-                memset(line, 0, (size_t)c->stride * sizeof *line);
-                for (int q = 0; q < 4; q++)
-                    if (share[q] != 0.0F)
-                        add_line(line,
-                                 coarse->x + m * c->size + (to[2].below[k] + q / 2) * c->plane +
-                                     (to[1].below[j] + q % 2) * c->stride,
-                                 share[q], c->stride);
-                spread(out, &to[0], line);
-                for (int64_t i = 0; i <= f->cells[0]; i++)
-                    x[i] += inverse[i] != 0.0F ? out[i] : 0.0F;
-            }
+        for (int64_t j = 0; j <= f->cells[1]; j++) {
+            const float *restrict free = inverse + m * f->size + k * f->plane + j * f->stride, z = to[2].beyond[k],
+                                  y = to[1].beyond[j];
+            const float share[4] = {(1.0F - y) * (1.0F - z), y * (1.0F - z), (1.0F - y) * z, y * z};
+            float *restrict x = plane + m * apart + j * f->stride;
+            memset(line, 0, (size_t)c->stride * sizeof *line);
+            for (int q = 0; q < 4; q++)
+                if (share[q] != 0.0F)
+                    add_line(line,
+                             coarse + m * c->size + (to[2].below[k] + q / 2) * c->plane +
+                                 (to[1].below[j] + q % 2) * c->stride,
+                             share[q], c->stride);
+            spread(out, &to[0], line);
+            for (int64_t i = 0; i <= f->cells[0]; i++)
+                x[i] += free[i] != 0.0F ? out[i] : 0.0F;
+        }
 }
 
 UZ_AVX2_FMA static void restrict_wide(const transfer *t, float *line, int64_t first, int64_t end)
@@ -161,9 +159,24 @@ UZ_AVX2_FMA static void restrict_wide(const transfer *t, float *line, int64_t fi
     restrict_all(t, line, first, end);
 }
 
-UZ_AVX2_FMA static void prolong_wide(const transfer *t, float *line, int64_t first, int64_t end)
+__attribute__((noinline)) UZ_AVX2_FMA static void prolong_wide(const uz_brick_level *f, const uz_brick_level *c,
+                                                               const float *inverse, const float *coarse, float *line,
+                                                               int64_t k, float *plane, int64_t apart)
 {
-    prolong_all(t, line, first, end);
+    prolong_any(f, c, inverse, coarse, line, k, plane, apart);
+}
+
+__attribute__((noinline)) static void prolong_narrow(const uz_brick_level *f, const uz_brick_level *c,
+                                                     const float *inverse, const float *coarse, float *line, int64_t k,
+                                                     float *plane, int64_t apart)
+{
+    prolong_any(f, c, inverse, coarse, line, k, plane, apart);
+}
+
+void uz_brick_prolong_plane(const uz_brick_level *level, const uz_brick_level *next, const float *inverse,
+                            const float *coarse, float *line, int64_t k, float *plane, int64_t apart)
+{
+    (uz_cpu_has_avx2_fma() ? prolong_wide : prolong_narrow)(level, next, inverse, coarse, line, k, plane, apart);
 }
 
 static void restrict_slab(void *ctx, int slab)
@@ -177,9 +190,10 @@ static void restrict_slab(void *ctx, int slab)
 static void prolong_slab(void *ctx, int slab)
 {
     const transfer *t = ctx;
-    const int64_t planes = t->f->cells[2] + 1;
-    (uz_cpu_has_avx2_fma() ? prolong_wide : prolong_all)(
-        t, t->room->of[slab].line, uz_brick_slab(planes, slab, t->slabs), uz_brick_slab(planes, slab + 1, t->slabs));
+    const int64_t planes = t->f->cells[2] + 1, end = uz_brick_slab(planes, slab + 1, t->slabs);
+    for (int64_t k = uz_brick_slab(planes, slab, t->slabs); k < end; k++)
+        uz_brick_prolong_plane(t->f, t->c, t->v->inverse, t->coarse->x, t->room->of[slab].line, k,
+                               t->v->x + k * t->f->plane, t->f->size);
 }
 
 void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
