@@ -109,8 +109,8 @@ struct uz_multigrid {
     int levels;
     size_t bytes;
     double most;  /* a bound on lambda_max(diag(K)^-1 M) */
-    double rough; /* |x'(A - K)x| is at most so many times x'diag(K)x, A what steps in single precision have for K and
-                     what they round on the way */
+    double rough; /* |x'(A - K)x| is at most so many times x'diag(K)x and FLT_EPSILON x'K x, A what steps in single
+                     precision have for K and what they round on the way */
     double drift; /* what single precision hides of a change, relative, in the energy norm; 0: not known */
     bool knows_K; /* without being handed it: of that only the diagonal is read, and need be there */
 };

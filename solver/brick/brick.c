@@ -54,10 +54,11 @@ double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, do
                     sum += sign_of(a, p) * sign_of(b, q) * (ke[(3 * a + m) * UZ_BRICK_DOFS + 3 * b + l] / unit);
             sum /= UZ_BRICK_NODES * UZ_BRICK_NODES;
             most = fmax(most, fabs(sum));
-            if ((p ^ (1 << m)) == (q ^ (1 << l)))
-                block[9 * (p ^ (1 << m)) + 3 * m + l] = sum;
-            else
+            if ((p ^ (1 << m)) != (q ^ (1 << l)) || p == 0 || q == 0)
                 off = fmax(off, fabs(sum));
+            if ((p ^ (1 << m)) == (q ^ (1 << l)) && m <= l) /* what all corners do alike meets no resistance */
+                block[9 * (p ^ (1 << m)) + 3 * m + l] = block[9 * (p ^ (1 << m)) + 3 * l + m] =
+                    p == 0 || q == 0 ? 0.0 : sum;
         }
     return off / most;
 }
