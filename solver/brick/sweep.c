@@ -2,9 +2,10 @@
  *
  * Once both layers of cells beside a plane of nodes are through, K x is known there, and x there is not read again: a
  * step of the smoother can change it on the spot. The next step follows a plane behind, so that all steps of a
- * smoother, with what comes before and after, pass through the vectors once (a wavefront: M. Wittmann, G. Hager, G.
- * Wellein, "Multicore-aware parallel temporal blocking of stencil codes", 2010). Threads share a sweep in slabs of
- * planes. What a slab needs of planes beside it, it computes once more for itself, with the same bits. */
+ * smoother, with what comes before and after, pass through the vectors once (a wavefront: Wittmann, Hager and Wellein,
+ * "Multicore-aware parallel temporal blocking of stencil codes for shared and distributed memory", IPDPS Workshops,
+ * 2010). Threads share a sweep in slabs of planes. What a slab needs of planes beside it, it computes once more for
+ * itself, with the same bits. */
 #include "brick/levels.h"
 
 #include "core/alloc.h"
@@ -128,7 +129,8 @@ static inline __attribute__((always_inline)) double finish(const uz_brick_vector
         return 0.0;
     fours sums[2] = {{0.0}};
     for (int64_t i = 0; i < n; i += WIDTH) {
-        *(lanes *)(t + i) = (lanes)(*(const masks *)(Kx + i) & (*(const lanes *)(inverse + i) != 0.0F));
+        const lanes of = *(const lanes *)(Kx + i);
+        *(lanes *)(t + i) = (lanes)((masks)of & (*(const lanes *)(inverse + i) != 0.0F));
         for (int half = 0; half < 2; half++)
             sums[half] += __builtin_convertvector(*(const four_singles *)(x + i + 4 * half), fours) *
                           __builtin_convertvector(*(const four_singles *)(t + i + 4 * half), fours);
