@@ -499,7 +499,7 @@ double uz_brick_predict_bytes(const uz_brick *brick)
     const double stride = (double)uz_brick_stride(brick->cells[0]);
     const double padded = 3.0 * stride * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
     return 4.0 * 5.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS +
-           144.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
+           192.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)

@@ -17,26 +17,35 @@
 #define REAL float
 #include "brick/line.inc"
 
-/* Planes beside a slab, below and above, that as many steps reach. */
-enum { BESIDE = 2 * UZ_BRICK_DEGREE_MOST };
-/* A slab has so many for each stage of a sweep, as it does planes beside it once more. */
+/* A slab has so many planes for each stage of a sweep, as it does planes beside it once more. */
 enum { PLANES_OF_STAGE = 4 };
+
+/* Stages of the longest sweep that has a slab for this part: coarser grids have no more planes. */
+static int64_t stages_of(const uz_brick_level *level, int part)
+{
+    const int64_t most = (level->cells[2] + 1) / (PLANES_OF_STAGE * (part + 1));
+    return part > 0 && most < UZ_BRICK_DEGREE_MOST ? most : UZ_BRICK_DEGREE_MOST;
+}
 
 bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, size_t *bytes)
 {
     const int64_t plane = 3 * level->plane + 2 * UZ_BRICK_PAD, sums = FIELDS * line_room(level->stride),
-                  line = 2 * (level->stride + UZ_BRICK_PAD), beside = 2 * BESIDE * 3 * level->plane + 2 * UZ_BRICK_PAD;
+                  line = 2 * (level->stride + UZ_BRICK_PAD);
     bool ok = (room->of_plane = uz_alloc_zero(level->cells[2] + 1, sizeof(double)));
     *bytes += 8 * (size_t)(level->cells[2] + 1);
     room->most = uz_aside_count();
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_room *of = &room->of[part];
-        for (int k = 0; k < 2 * UZ_BRICK_DEGREE_MOST; k++)
+        /* reach: planes of x and of d, below and above, where there are two slabs */
+        const int64_t stages = stages_of(level, part),
+                      reach = room->most < 2 ? 0 : stages_of(level, part > 0 ? part : 1),
+                      beside = reach > 0 ? 4 * reach * 3 * level->plane + 2 * UZ_BRICK_PAD : 0;
+        for (int k = 0; k < 2 * stages; k++)
             ok = (of->plane[k / 2][k % 2] = uz_alloc_zero(plane, sizeof(float))) && ok;
         ok = (of->sums = uz_alloc_zero(sums, sizeof(float))) && ok;
         ok = (of->line = uz_alloc_zero(line, sizeof(float))) && ok;
-        ok = (room->most < 2 || (of->beside = uz_alloc_zero(beside, sizeof(float)))) && ok;
-        *bytes += 4 * (size_t)(2 * UZ_BRICK_DEGREE_MOST * plane + sums + line + (room->most < 2 ? 0 : beside));
+        ok = (beside == 0 || (of->beside = uz_alloc_zero(beside, sizeof(float)))) && ok;
+        *bytes += 4 * (size_t)(2 * stages * plane + sums + line + beside);
     }
     return ok;
 }
@@ -199,9 +208,8 @@ static float *plane_of(int64_t *apart, const slab *own, int vector, int64_t k)
     if (!s->changes || (k >= own->begin && k < own->end))
         return (vector == 0 ? s->v->x : s->v->d) + k * plane;
     *apart = plane;
-    const int64_t place =
-        k < own->begin ? UZ_BRICK_DEGREE_MOST - (own->begin - k) : UZ_BRICK_DEGREE_MOST + k - own->end;
-    return own->room.beside + (vector * BESIDE + place) * 3 * plane;
+    const int64_t reach = s->stages, place = k < own->begin ? reach - (own->begin - k) : reach + k - own->end;
+    return own->room.beside + (2 * vector * reach + place) * 3 * plane;
 }
 
 /* x beside the slab as it is before others change it there. */

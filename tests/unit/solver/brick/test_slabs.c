@@ -13,15 +13,15 @@
 
 enum { THREADS = 3 };
 
-static uz_body_model make_cells(uz_scene *scene, double poisson)
+static uz_body_model make_cells_of(uz_scene *scene, double poisson, int64_t nx, int64_t ny, int64_t nz)
 {
     uz_body_model cells;
     uz_error err = {0};
-    *scene = box_scene(60, 20, 41, 30);
+    *scene = box_scene(60, 20, nx, ny);
     scene->model = UZ_SOLID;
     scene->box.dim = 3;
     scene->box.size[2] = 30;
-    scene->box.cells[2] = 37;
+    scene->box.cells[2] = nz;
     snprintf(scene->box.element, sizeof scene->box.element, "hex8");
     scene->materials[0].poisson = poisson;
     add_support(scene, "left", 0, 0);
@@ -29,6 +29,11 @@ static uz_body_model make_cells(uz_scene *scene, double poisson)
     CHECK_INT(uz_body_model_build(&cells, scene, UZ_BODY_CELLS, &err), UZ_OK);
     CHECK(cells.brick != NULL);
     return cells;
+}
+
+static uz_body_model make_cells(uz_scene *scene, double poisson)
+{
+    return make_cells_of(scene, poisson, 41, 30, 37);
 }
 
 static double number(int64_t j)
@@ -203,6 +208,26 @@ TEST(a_product_with_few_numbers_is_that_of_all_cells)
     free(hi);
     free(lo);
     free(y);
+    uz_body_model_clear(&cells);
+    uz_scene_clear(&scene);
+}
+
+/* Of a plate, whose planes are large, where threads share a sweep in a few slabs alone. */
+TEST(rooms_of_threads_take_what_is_predicted)
+{
+    uz_scene scene;
+    uz_body_model cells = make_cells_of(&scene, 0.3, 60, 60, 10);
+    uz_multigrid *mg;
+    uz_error err = {0};
+    size_t bytes = 0;
+    CHECK_INT(uz_aside_begin(THREADS), THREADS);
+    CHECK_INT(uz_brick_multigrid(&mg, cells.brick, 0, &err), UZ_OK);
+    uz_multigrid_room *room = mg->kind->room(mg, &bytes);
+    CHECK(room);
+    const double all = (double)(mg->bytes + bytes), predicted = uz_brick_predict_bytes(cells.brick);
+    CHECK_MSG(all <= predicted, "%g of %g bytes", all, predicted);
+    mg->kind->free_room(room);
+    uz_multigrid_free(mg);
     uz_body_model_clear(&cells);
     uz_scene_clear(&scene);
 }
