@@ -23,6 +23,8 @@
 #include <string.h>
 
 enum { CORNERS = 4, FROM = 8 };
+/* Squares of diagonals that differ by less, as those of a rectangle do by rounding, are as long. */
+#define ALIKE 1e-9
 
 /* A part of an element that was given, its root: the whole of it at first. Sets of corners are bits. */
 typedef struct {
@@ -229,7 +231,7 @@ static void cut(bisection *x, int64_t e)
             const double way = x->all.xyz[whole.corner[k] * x->dim + c] - x->all.xyz[whole.corner[k + 2] * x->dim + c];
             length[k] += way * way;
         }
-    const int i = length[1] < length[0] ? 1 : 0;
+    const int i = length[1] < (1 - ALIKE) * length[0] ? 1 : 0;
     const int64_t at = edge_of(x, whole.corner[i], whole.corner[i + 2]);
     if (!x->all.failed && whole.quadratic && x->all.links[at].middle < 0) {
         int64_t from[FROM];

@@ -180,6 +180,31 @@ TEST(all_elements_of_a_box_become_as_many_as_of_a_finer_one)
     }
 }
 
+/* Both diagonals of a rectangle are as long: rounding of places does not choose the one that it is cut along. */
+TEST(rectangles_that_are_turned_are_cut_alike)
+{
+    for (int turn = 0; turn < 8; turn++) {
+        uz_mesh fine = mesh_of("quad4", 5), turned = mesh_of("quad4", 5);
+        list *all = calloc(1, sizeof *all);
+        all->value[all->count++] = fine.n_elements;
+        for (int64_t e = 0; e < fine.n_elements; e++)
+            all->value[all->count++] = e;
+        for (int64_t a = 0; a < turned.n_nodes; a++) {
+            double *x = turned.xyz + 2 * a;
+            const double from[2] = {x[X], x[Y]};
+            x[X] = cos(turn) * from[X] - sin(turn) * from[Y];
+            x[Y] = sin(turn) * from[X] + cos(turn) * from[Y];
+        }
+        CHECK_INT(uz_mesh_bisect(&fine, all->value, all->count, NULL), UZ_OK);
+        CHECK_INT(uz_mesh_bisect(&turned, all->value, all->count, NULL), UZ_OK);
+        CHECK_INT(turned.n_elements, fine.n_elements);
+        CHECK(memcmp(turned.node, fine.node, (size_t)fine.first[fine.n_elements] * sizeof *fine.node) == 0);
+        uz_mesh_clear(&fine);
+        uz_mesh_clear(&turned);
+        free(all);
+    }
+}
+
 /* However deep a corner is refined, the shapes are those of the first few bisections. */
 TEST(shapes_do_not_get_worse)
 {
