@@ -14,8 +14,8 @@ import generated_words  # noqa: after its place is known
 SHARED = True  # one service for all tests
 
 # What was answered otherwise in other words, or refused: forces of warmth compared (59), points in large units (102, 103), a turned press (84),
-# a tie of linear and quadratic sides renumbered (126), a rigid group that was moved (215).
-FOUND = [59, 84, 102, 103, 126, 215]
+# a tie of linear and quadratic sides renumbered (126), a rigid group that was moved (215), rectangles cut along a diagonal by rounding (91047); a case that nothing holds (91041).
+FOUND = [59, 84, 102, 103, 126, 215, 91041, 91047]
 
 
 def look(s, numbers):

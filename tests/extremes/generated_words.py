@@ -398,7 +398,7 @@ def compare(scene, word, found, other, claim):
     """One case of the scene with one of what was said otherwise."""
     summary, image = found["summary"], other["summary"]
     dim, M, L, F = scene.dim, word.M, word.length, word.force
-    if {summary["outcome"], image["outcome"]} & UNSTEADY or summary["energy"]["strain"] is not None and abs(summary["energy"]["strain"]) < QUIET * scene.stiff:
+    if {summary["outcome"], image["outcome"]} & UNSTEADY or abs(number_of(summary["energy"].get("strain"))) < QUIET * scene.stiff:
         return
     claim(summary["outcome"] == image["outcome"], "outcome", summary["outcome"], image["outcome"], image.get("message"))
     if summary["outcome"] not in ("converged", "mesh_limit") or image["outcome"] != summary["outcome"]:
