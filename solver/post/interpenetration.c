@@ -30,6 +30,9 @@
 #define ALIKE 0.5
 /* In local coordinates: less deep in an element a point is on its side, and may be of it. */
 #define ON_SIDE 1e-6
+/* Points of edges in space are looked at so far from there to the middle of the side: of what is symmetric, edges meet
+ * sides between two elements, on which a point is in neither. */
+#define INWARD 1e-3
 
 enum { QUARTERS = 4, MOST_CROSSINGS = 32 };
 
@@ -378,7 +381,9 @@ static uz_status look_along(work *w, int64_t side, int a, int b, int middle, con
     qsort(at, (size_t)p.n, sizeof *at, by_value);
     for (int k = 1; k < p.n && status == UZ_OK; k++) {
         const double t = 0.5 * (at[k - 1] + at[k]);
-        const double point[2] = {(1 - t) * local[a][0] + t * local[b][0], (1 - t) * local[a][1] + t * local[b][1]};
+        double point[2] = {(1 - t) * local[a][0] + t * local[b][0], (1 - t) * local[a][1] + t * local[b][1]};
+        for (int c = 0; c < 2 && dim == 3; c++)
+            point[c] += INWARD * ((uz_face_corners(dim, of->nodes) == 3 ? 1.0 / 3 : 0) - point[c]);
         if (at[k] > at[k - 1])
             status = look(w, side, point, err);
     }

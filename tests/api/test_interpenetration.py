@@ -177,6 +177,14 @@ def answers(s, request):
     return found.get("cases", [found])
 
 
+def test_edges_that_meet_sides_between_elements(s):
+    """A symmetric ring of one layer, pressed past itself by a little: all its edges there lie on sides between elements or on outer ones."""
+    request = squeezed("hex8", "st_venant_kirchhoff", random.Random(0), cells=(28, 2), inner=0.8449, down=0.8610)
+    (answer,) = answers(s, request)
+    deep, _ = passes_through(request["problem"]["mesh"], answer["displacements"])
+    check(answer["summary"]["outcome"] == "converged" and deep and told(answer), deep, answer["summary"]["warnings"])
+
+
 def test_nothing_passes_through_unsaid(s):
     """72 bodies that are led into themselves or each other, or nearly so, in all elements and laws."""
     said, count = [], collections.Counter()
