@@ -79,8 +79,8 @@ def squeezed(kind, law, rng, cells=None, inner=None, down=None, half=False):
     return request
 
 
-def folded(kind, law, rng):
-    """A strip, half of which lies still; its right end is turned by half a turn and put above that, or into it."""
+def folded(kind, law, rng, turn=175):
+    """A strip, half of which lies still; its right end is turned by so many degrees and put above that, or into it."""
     long, high, n = rng.uniform(4, 5), rng.uniform(-0.3, 1), rng.randint(14, 20)
     place = lambda x, *t: (long * x, 0.5 * t[0], 0.3 * t[1]) if kind in SOLID else (long * x, 0.3 * t[0])
     request = scene(kind, 1, [(n, 1)], [place], {"up": (0, "top"), "down": (0, "bottom"), "right": (0, "right")}, law, [])
@@ -88,7 +88,7 @@ def folded(kind, law, rng):
     groups = request["problem"]["mesh"]["groups"]
     nodes = request["problem"]["mesh"]["nodes"]
     groups["still"] = {key: [side for side in groups.pop("down")[key] if max(nodes[k][0] for k in side) < 0.5 * long]}
-    point, turned = ([long, 0, 0.15], {"uy": 0, "rx": 0, "ry": -math.pi, "rz": 0}) if kind in SOLID else ([long, 0.15], {"rz": math.pi})
+    point, turned = ([long, 0, 0.15], {"uy": 0, "rx": 0, "ry": -turn, "rz": 0}) if kind in SOLID else ([long, 0.15], {"rz": turn})
     across = "uz" if kind in SOLID else "uy"
     request["problem"]["supports"] = [moved(kind, "still", 0, 0), {"on": "right", "rigid": {"point": point, "ux": -long * rng.uniform(0.7, 0.85), across: high, **turned}}]
     request["cases"] = [{"name": "bend", "steps": [0.5, 1]}]

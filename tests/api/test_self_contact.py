@@ -71,12 +71,17 @@ def test_a_ring_pressed_flat_is_as_half_of_it_on_a_plane(s):
 
 def test_a_side_that_faces_nothing_at_rest(s):
     """It may come to face itself where large deformation leads it; small does not."""
-    request = folded("quad4", "neo_hooke", random.Random(0))
+    request = folded("quad4", "neo_hooke", random.Random(0), turn=3)  # pushed back, its end hardly turned
     free = answers(s, request)[0]
     request["problem"]["contacts"] = [{"on": "up", "with": "up"}]
     held = answers(s, request)
     check(apart(held[0], free) < 1e-9 and held[0]["summary"]["contact"]["candidates"] > 0, "not there yet", apart(held[0], free))
     check(held[1]["summary"]["contact"]["reaction_sum"] < 0, held[1]["summary"]["contact"])
+    over = folded("quad4", "neo_hooke", random.Random(0))  # turned over: its end is held above what lies still
+    over["problem"]["contacts"] = [{"on": "up", "with": "up"}]
+    above = answers(s, over)[1]["summary"]
+    high = over["problem"]["supports"][1]["rigid"]["uy"]
+    check(above["outcome"] == "converged" and above["contact"]["reaction_sum"] == 0 and abs(above["finite"]["least_gap"] - (high - 0.3)) < 2e-3, high, above)
     small = finite_fold("quad4", [{"on": "outer", "with": "outer"}])
     small["problem"].update(kinematics="moving", materials=[{"on": "all", "young": 1000, "poisson": 0.3}])
     reply = s.post(small, {"Prefer": "wait=60"})
