@@ -42,12 +42,15 @@ static bool precedes(const order *by, int64_t a, int64_t b)
     return x < y || (x == y && a < b);
 }
 
-/* Hoare's FIND (CACM 4 (1961) 321) with the middle item for pivot: items before `place` precede those from it on. */
+/* Hoare's FIND (CACM 4 (1961) 321): items before `place` precede those from it on. Pivots are scattered, as the middle
+ * item of a mesh numbered in an even number of rows is at the end of all. */
 static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, const order *by)
 {
     int64_t low = first, high = end - 1;
+    uint64_t scatter = 1;
     while (low < high) {
-        const int64_t pivot = item[low + (high - low) / 2];
+        scatter = scatter * 6364136223846793005u + 1442695040888963407u; /* Knuth's MMIX */
+        const int64_t pivot = item[low + (int64_t)((scatter >> 33) % (uint64_t)(high - low + 1))];
         int64_t i = low, j = high;
         while (i <= j) {
             while (precedes(by, item[i], pivot))
