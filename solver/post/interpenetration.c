@@ -55,7 +55,7 @@ typedef struct {
 
 /* A point of the boundary. */
 typedef struct {
-    int64_t side;
+    int64_t side, node; /* -1: between nodes */
     double local[2], x[3], normal[3], length;
 } place;
 
@@ -72,19 +72,61 @@ static int gather(double *xyz, int64_t node[UZ_FACE_NODES], const work *w, const
     return count;
 }
 
-/* A box of all of a quadratic side or element, whose middles may be off their edges. */
-static void enclose(double *box, const double *xyz, int count, int corners, int dim)
+/* In the plane a quadratic edge is within the triangle of its ends and the place where its tangents there meet, as a
+ * curve of Bezier: xyz gets these places for its middles. */
+static void put_hull(double *xyz, int count, int corners, int dim)
 {
+    for (int a = corners; a < count && dim == 2; a++)
+        for (int c = 0; c < dim; c++)
+            xyz[dim * a + c] = 2 * xyz[dim * a + c] -
+                               0.5 * (xyz[dim * (a - corners) + c] + xyz[dim * ((a - corners + 1) % corners) + c]);
+}
+
+/* A box of all of a side or an element, of which xyz is left the hull; in space there is room for faces that bulge. */
+static void enclose(double *box, double *xyz, int count, int corners, int dim)
+{
+    put_hull(xyz, count, corners, dim);
     for (int c = 0; c < dim; c++) {
         double low = INFINITY, high = -INFINITY;
         for (int a = 0; a < count; a++) {
-            low = fmin(low, xyz[dim * a + c]);
-            high = fmax(high, xyz[dim * a + c]);
+            const double x = xyz[dim * a + c];
+            low = x < low ? x : low;
+            high = x > high ? x : high;
         }
-        const double room = (count > corners ? 0.25 : 1e-9) * (high - low);
+        const double room = (count > corners && dim == 3 ? 0.25 : 1e-9) * (high - low);
         box[c] = low - room;
         box[dim + c] = high + room;
     }
+}
+
+/* Is all of the element to one side of the point, along the normal of one of its sides? False: that does not tell. */
+static bool is_beside(const uz_element_type *type, const double *xyz, const double *x)
+{
+    const int dim = type->dim;
+    double hull[3 * UZ_ELEMENT_NODES];
+    if (dim == 3 && type->nodes > type->corners)
+        return false;
+    memcpy(hull, xyz, (size_t)(dim * type->nodes) * sizeof *hull);
+    put_hull(hull, type->nodes, type->corners, dim);
+    for (int k = 0; k < type->sides; k++) {
+        const uz_element_side *side = &type->side[k];
+        const double *from = hull + dim * side->node[0], *to = hull + dim * side->node[1],
+                     *last = hull + dim * side->node[side->corners - 1];
+        double normal[3] = {to[1] - from[1], from[0] - to[0], 0}, low = INFINITY, high = -INFINITY;
+        if (dim == 3)
+            uz_cross3(normal, (double[]){to[0] - from[0], to[1] - from[1], to[2] - from[2]},
+                      (double[]){last[0] - from[0], last[1] - from[1], last[2] - from[2]});
+        for (int a = 0; a < type->nodes; a++) {
+            double along = 0;
+            for (int c = 0; c < dim; c++)
+                along += normal[c] * (hull[dim * a + c] - x[c]);
+            low = along < low ? along : low;
+            high = along > high ? along : high;
+        }
+        if (low > -1e-9 * (high - low) || high < 1e-9 * (high - low))
+            return true;
+    }
+    return false;
 }
 
 static double length_of(const double *xyz, int count, int dim)
@@ -139,6 +181,16 @@ typedef struct {
     int64_t element;
 } question;
 
+/* Is the point one of the element's boundary, as of the side's own? */
+static bool is_of(const work *w, const place *p, int64_t e)
+{
+    const uz_mesh *mesh = &w->model->mesh;
+    bool own = p->node < 0 && w->outer.face[p->side].element == e;
+    for (int64_t k = mesh->first[e]; p->node >= 0 && k < mesh->first[e + 1]; k++)
+        own = own || mesh->node[k] == p->node;
+    return own;
+}
+
 /* Is the point within this element? */
 static bool is_within(void *ctx, int64_t e)
 {
@@ -146,8 +198,11 @@ static bool is_within(void *ctx, int64_t e)
     const uz_mesh *mesh = &q->w->model->mesh;
     const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
     double xyz[3 * UZ_ELEMENT_NODES], N[UZ_ELEMENT_NODES], point[3], off[3] = {0};
+    if (is_of(q->w, q->p, e))
+        return false;
     const int count = gather_element(xyz, q->w, q->s, e);
-    if (!uz_element_find(point, type, xyz, mesh->extent, q->p->x) || !(uz_element_depth(type, point) > ON_SIDE))
+    if (is_beside(type, xyz, q->p->x) || !uz_element_find(point, type, xyz, mesh->extent, q->p->x) ||
+        !(uz_element_depth(type, point) > ON_SIDE))
         return false;
     type->shape(type, N, NULL, point);
     for (int i = 0; i < mesh->dim * count; i++)
@@ -245,9 +300,10 @@ static void put(place *p, const work *w, const shape *s)
     p->length = length_of(xyz, side.nodes, dim);
 }
 
-static uz_status look(work *w, int64_t side, const double local[2], uz_error *err)
+/* node: -1, or the one that is there. */
+static uz_status look(work *w, int64_t side, int64_t node, const double local[2], uz_error *err)
 {
-    place p = {.side = side, .local = {local[0], local[1]}};
+    place p = {.side = side, .node = node, .local = {local[0], local[1]}};
     int64_t passed, before;
     put(&p, w, &w->now);
     double depth = depth_of(&passed, w, &w->now, &p);
@@ -385,7 +441,7 @@ static uz_status look_along(work *w, int64_t side, int a, int b, int middle, con
         for (int c = 0; c < 2 && dim == 3; c++)
             point[c] += INWARD * ((uz_face_corners(dim, of->nodes) == 3 ? 1.0 / 3 : 0) - point[c]);
         if (at[k] > at[k - 1])
-            status = look(w, side, point, err);
+            status = look(w, side, -1, point, err);
     }
     return status;
 }
@@ -401,10 +457,10 @@ static uz_status look_at_side(work *w, int64_t i, unsigned char *seen, uz_error 
     const int dim = side.dim, corners = uz_face_corners(dim, side.nodes);
     const double(*local)[3] = uz_side_local_nodes(&side);
     const double middle[2] = {dim == 2 ? 0 : corners == 3 ? 1.0 / 3 : 0, dim == 3 && corners == 3 ? 1.0 / 3 : 0};
-    uz_status status = dim == 3 ? look(w, i, middle, err) : UZ_OK;
+    uz_status status = dim == 3 ? look(w, i, -1, middle, err) : UZ_OK;
     for (int a = 0; a < side.nodes && status == UZ_OK; a++)
         if (!seen[node[a]]++)
-            status = look(w, i, local[a], err);
+            status = look(w, i, node[a], local[a], err);
     for (int a = 0; a < (dim == 2 ? 1 : corners) && status == UZ_OK; a++) {
         const int b = (a + 1) % corners;
         if (dim == 2 || node[a] < node[b])
