@@ -171,8 +171,8 @@ def test_searches_sorts_and_compares(s, b):
     has_rows(b, 3)
     for _ in range(3):
         b.run("[...document.querySelectorAll('.sizer .row .choice input')].find((box) => !box.checked).click()")
-    for _ in range(2):
-        b.click("#delete-chosen")
+    b.one("#delete-chosen")
+    b.run("const button = document.querySelector('#delete-chosen'); button.click(); button.click()")  # within its 4 s
     b.says(".empty", "No jobs yet")
 
 
