@@ -188,6 +188,19 @@ static void remove_folder(const char *folder)
     rmdir(folder);
 }
 
+/* Power may be cut from now on, of a store in a folder of its own. */
+static void power_begin(told *t, uint64_t seed)
+{
+    faulty_reset();
+    strcpy(power.folder, "/tmp/test-power-XXXXXX");
+    CHECK(mkdtemp(power.folder));
+    power.seed = seed ^ 0x5555;
+    power.now = t;
+    power.cut = false;
+    faulty.tracks = true;
+    faulty.on_cut = cut_power;
+}
+
 /* One life with a power loss at some write or sync of it. Returns false once the life is shorter than that. */
 static void lose_power(long run)
 {
@@ -195,14 +208,7 @@ static void lose_power(long run)
     told t = {.count = 0};
     char path[96], message[400] = "";
     uint64_t seed = (uint64_t)run * 7919 + 1;
-    faulty_reset();
-    strcpy(power.folder, "/tmp/test-power-XXXXXX");
-    CHECK(mkdtemp(power.folder));
-    power.seed = seed ^ 0x5555;
-    power.now = &t;
-    power.cut = false;
-    faulty.tracks = true;
-    faulty.on_cut = cut_power;
+    power_begin(&t, seed);
     if (!place_begin(&p)) /* the cut may come while the file is made too */
         return;
     faulty.cut_at = faulty.events + 1 + (long)(faulty_random(&seed) % 400);
@@ -257,14 +263,7 @@ TEST(power_loss_takes_nothing_while_the_log_is_moved)
         told t = {.count = 0};
         char path[96], message[400] = "";
         uint64_t seed = (uint64_t)run * 104729 + 3;
-        faulty_reset();
-        strcpy(power.folder, "/tmp/test-power-XXXXXX");
-        CHECK(mkdtemp(power.folder));
-        power.seed = seed ^ 0x5555;
-        power.now = &t;
-        power.cut = false;
-        faulty.tracks = true;
-        faulty.on_cut = cut_power;
+        power_begin(&t, seed);
         CHECK(place_begin(&p));
         CHECK_INT(step_submit(p.s, &t, SIZE), STORE_OK);
         const bool within = run % 2; /* or soon after, where the log begins anew */
