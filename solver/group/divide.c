@@ -4,48 +4,11 @@
 #include "group/divide.h"
 
 #include "core/alloc.h"
-#include "core/random.h"
+#include "core/select.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct {
-    double along; /* the line */
-    int32_t point;
-} placed;
-
-static bool is_before(placed a, placed b)
-{
-    return a.along != b.along ? a.along < b.along : a.point < b.point;
-}
-
-/* The first `left` of them to the front, in any order (Hoare, "Algorithm 65: find", Commun. ACM 4 (1961) 321-322). */
-static void select_first(placed *points, int64_t n, int64_t left)
-{
-    uint64_t state = 1;
-    for (int64_t low = 0, high = n - 1; low < high;) {
-        int64_t i = low, j = high;
-        const placed pivot = points[low + (int64_t)(uz_uniform(&state) * (double)(high - low))];
-        while (i <= j) {
-            while (is_before(points[i], pivot))
-                i++;
-            while (is_before(pivot, points[j]))
-                j--;
-            if (i <= j) {
-                const placed other = points[i];
-                points[i++] = points[j];
-                points[j--] = other;
-            }
-        }
-        if (left <= j)
-            high = j;
-        else if (left >= i)
-            low = i;
-        else
-            break;
-    }
-}
 
 enum { POWER_STEPS = 30 };
 
@@ -70,44 +33,44 @@ static void find_line(double line[3], double M[3][3], int dim)
 }
 
 /* Where n points are along their line. */
-static void place_points(placed *points, int64_t n, const double *x, int dim)
+static void place_points(uz_placed *points, int64_t n, const double *x, int dim)
 {
     double mean[3] = {0}, M[3][3] = {{0}}, line[3];
     for (int64_t k = 0; k < n; k++)
         for (int c = 0; c < dim; c++)
-            mean[c] += x[points[k].point * (int64_t)dim + c] / (double)n;
+            mean[c] += x[points[k].item * dim + c] / (double)n;
     for (int64_t k = 0; k < n; k++)
         for (int i = 0; i < dim; i++)
             for (int j = 0; j < dim; j++)
-                M[i][j] += (x[points[k].point * (int64_t)dim + i] - mean[i]) *
-                           (x[points[k].point * (int64_t)dim + j] - mean[j]);
+                M[i][j] += (x[points[k].item * dim + i] - mean[i]) * (x[points[k].item * dim + j] - mean[j]);
     find_line(line, M, dim);
     for (int64_t k = 0; k < n; k++) {
         points[k].along = 0.0;
         for (int c = 0; c < dim; c++)
-            points[k].along += line[c] * (x[points[k].point * (int64_t)dim + c] - mean[c]);
+            points[k].along += line[c] * (x[points[k].item * dim + c] - mean[c]);
     }
 }
 
-static void divide(int32_t *part, placed *points, int64_t n, const double *x, int dim, int64_t first, int64_t processes)
+static void divide(int32_t *part, uz_placed *points, int64_t n, const double *x, int dim, int64_t first,
+                   int64_t processes)
 {
     if (processes == 1) {
         for (int64_t k = 0; k < n; k++)
-            part[points[k].point] = (int32_t)first;
+            part[points[k].item] = (int32_t)first;
         return;
     }
     const int64_t left = processes / 2, of_left = n * left / processes;
     place_points(points, n, x, dim);
-    select_first(points, n, of_left);
+    uz_select_first(points, n, of_left);
     divide(part, points, of_left, x, dim, first, left);
     divide(part, points + of_left, n - of_left, x, dim, first + left, processes - left);
 }
 
 bool uz_divide(int32_t *part, const double *x, int64_t n, int dim, int64_t processes)
 {
-    placed *points = uz_alloc(n, sizeof *points);
+    uz_placed *points = uz_alloc(n, sizeof *points);
     for (int64_t k = 0; points && k < n; k++)
-        points[k].point = (int32_t)k;
+        points[k].item = k;
     if (points)
         divide(part, points, n, x, dim, 0, processes);
     free(points);

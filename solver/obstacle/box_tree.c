@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/select.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,61 +31,19 @@ static double centre(const double *box, int dim, int64_t item, int axis)
     return isfinite(low) ? low : isfinite(high) ? high : 0;
 }
 
-/* Order of the items along an axis, equal ones by number. */
-typedef struct {
-    const double *box;
-    int dim, axis;
-} order;
-
-static bool precedes(const order *by, int64_t a, int64_t b)
-{
-    const double x = centre(by->box, by->dim, a, by->axis), y = centre(by->box, by->dim, b, by->axis);
-    return x < y || (x == y && a < b);
-}
-
-/* Hoare's FIND (CACM 4 (1961) 321): items before `place` precede those from it on. Pivots are scattered, as the middle
- * item of a mesh numbered in an even number of rows is at the end of all. */
-static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, const order *by)
-{
-    int64_t low = first, high = end - 1;
-    uint64_t scatter = 1;
-    while (low < high) {
-        scatter = scatter * 6364136223846793005u + 1442695040888963407u; /* Knuth's MMIX */
-        const int64_t pivot = item[low + (int64_t)((scatter >> 33) % (uint64_t)(high - low + 1))];
-        int64_t i = low, j = high;
-        while (i <= j) {
-            while (precedes(by, item[i], pivot))
-                i++;
-            while (precedes(by, pivot, item[j]))
-                j--;
-            if (i <= j) {
-                const int64_t kept = item[i];
-                item[i++] = item[j];
-                item[j--] = kept;
-            }
-        }
-        if (place <= j)
-            high = j;
-        else if (place >= i)
-            low = i;
-        else
-            return;
-    }
-}
-
 /* The box of a node's items, and those below it: halves by the median along the axis in which centres are spread most.
  */
-static void build_node(uz_box_tree *tree, const double *box, part of)
+static void build_node(uz_box_tree *tree, uz_placed *list, const double *box, part of)
 {
     const int dim = tree->dim;
     double *own = tree->box + 2 * dim * of.node, most = -1;
-    order by = {box, dim, 0};
+    int axis = 0;
     for (int c = 0; c < dim; c++) {
         double low = INFINITY, high = -INFINITY;
         own[c] = INFINITY;
         own[dim + c] = -INFINITY;
         for (int64_t i = of.first; i < of.end; i++) {
-            const double *its = box + 2 * dim * tree->item[i], at = centre(box, dim, tree->item[i], c);
+            const double *its = box + 2 * dim * list[i].item, at = centre(box, dim, list[i].item, c);
             own[c] = fmin(own[c], its[c]);
             own[dim + c] = fmax(own[dim + c], its[dim + c]);
             low = fmin(low, at);
@@ -92,13 +51,15 @@ static void build_node(uz_box_tree *tree, const double *box, part of)
         }
         if (high - low > most) {
             most = high - low;
-            by.axis = c;
+            axis = c;
         }
     }
     if (of.end - of.first > LEAF) {
-        split_at(tree->item, of.first, of.end, half_of(of, 0).end, &by);
-        build_node(tree, box, half_of(of, 0));
-        build_node(tree, box, half_of(of, 1));
+        for (int64_t i = of.first; i < of.end; i++)
+            list[i].along = centre(box, dim, list[i].item, axis);
+        uz_select_first(list + of.first, of.end - of.first, half_of(of, 0).end - of.first);
+        build_node(tree, list, box, half_of(of, 0));
+        build_node(tree, list, box, half_of(of, 1));
     }
 }
 
@@ -109,14 +70,19 @@ uz_status uz_box_tree_init(uz_box_tree *out, int64_t n, int dim, const double *b
         out->levels++;
     out->item = uz_alloc(n, sizeof *out->item);
     out->box = uz_alloc(2 * dim * ((int64_t)1 << out->levels), sizeof *out->box);
-    if (!out->item || !out->box) {
+    uz_placed *list = uz_alloc(n, sizeof *list);
+    if (!out->item || !out->box || !list) {
+        free(list);
         uz_box_tree_clear(out);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a search tree of %lld boxes", (long long)n);
     }
     for (int64_t i = 0; i < n; i++)
-        out->item[i] = i;
+        list[i].item = i;
     if (n > 0)
-        build_node(out, box, (part){1, 0, n});
+        build_node(out, list, box, (part){1, 0, n});
+    for (int64_t i = 0; i < n; i++)
+        out->item[i] = list[i].item;
+    free(list);
     return UZ_OK;
 }
 
