@@ -11,11 +11,11 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "core/vector3.h"
 #include "element/element.h"
 #include "obstacle/box_tree.h"
 #include "obstacle/face_point.h"
-#include "scene/corner_table.h"
 #include "scene/mesh_parts.h"
 
 #include <math.h>
@@ -44,7 +44,7 @@ typedef struct {
 
 typedef struct {
     const uz_body_model *model;
-    uz_group outer;
+    const uz_group *outer;
     int64_t *part;        /* of each node */
     unsigned char *joins; /* pairs x n_nodes: bits of the two groups of a contact or a tie that have the node */
     int64_t pairs;
@@ -66,7 +66,7 @@ static const char *const NO_MEMORY = "no memory to look for a body that passes t
 /* Nodes of an outer side; returns how many. */
 static int gather(double *xyz, int64_t node[UZ_FACE_NODES], const work *w, const shape *s, int64_t side)
 {
-    const int dim = w->model->mesh.dim, count = uz_mesh_face(node, &w->model->mesh, w->outer.face[side]);
+    const int dim = w->model->mesh.dim, count = uz_mesh_face(node, &w->model->mesh, w->outer->face[side]);
     for (int a = 0; a < count; a++)
         memcpy(xyz + dim * a, s->xyz + dim * node[a], (size_t)dim * sizeof *xyz);
     return count;
@@ -153,7 +153,7 @@ static uz_status make_shape(shape *s, const work *w, uz_error *err)
 {
     const uz_mesh *mesh = &w->model->mesh;
     const int dim = mesh->dim;
-    double *box = uz_alloc(mesh->n_elements + w->outer.n_faces, 6 * sizeof *box), xyz[3 * UZ_ELEMENT_NODES];
+    double *box = uz_alloc(mesh->n_elements + w->outer->n_faces, 6 * sizeof *box), xyz[3 * UZ_ELEMENT_NODES];
     if (!box)
         return uz_fail(err, UZ_ERR_MEMORY, "", "%s", NO_MEMORY);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
@@ -161,13 +161,13 @@ static uz_status make_shape(shape *s, const work *w, uz_error *err)
         enclose(box + 2 * dim * e, xyz, count, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, dim);
     }
     uz_status status = uz_box_tree_init(&s->elements, mesh->n_elements, dim, box, err);
-    for (int64_t i = 0; i < w->outer.n_faces; i++) {
+    for (int64_t i = 0; i < w->outer->n_faces; i++) {
         int64_t node[UZ_FACE_NODES];
         const int count = gather(xyz, node, w, s, i);
         enclose(box + 2 * dim * i, xyz, count, uz_face_corners(dim, count), dim);
     }
     if (status == UZ_OK)
-        status = uz_box_tree_init(&s->sides, w->outer.n_faces, dim, box, err);
+        status = uz_box_tree_init(&s->sides, w->outer->n_faces, dim, box, err);
     free(box);
     return status;
 }
@@ -185,7 +185,7 @@ typedef struct {
 static bool is_of(const work *w, const place *p, int64_t e)
 {
     const uz_mesh *mesh = &w->model->mesh;
-    bool own = p->node < 0 && w->outer.face[p->side].element == e;
+    bool own = p->node < 0 && w->outer->face[p->side].element == e;
     for (int64_t k = mesh->first[e]; p->node >= 0 && k < mesh->first[e + 1]; k++)
         own = own || mesh->node[k] == p->node;
     return own;
@@ -224,7 +224,7 @@ static double distance_to(const void *ctx, int64_t item, const double *x, double
     uz_foot foot;
     const int count = gather(xyz, node, q->w, q->s, item);
     const int64_t *part = q->w->part, there = part[mesh->node[mesh->first[q->element]]];
-    const int mine = uz_mesh_face(own, mesh, q->w->outer.face[q->p->side]);
+    const int mine = uz_mesh_face(own, mesh, q->w->outer->face[q->p->side]);
     if (part[node[0]] != there)
         return INFINITY;
     for (int a = 0; a < count; a++)
@@ -285,7 +285,7 @@ static void put(place *p, const work *w, const shape *s)
     double N[UZ_FACE_NODES], xyz[3 * UZ_FACE_NODES];
     int64_t node[UZ_FACE_NODES];
     uz_side side;
-    uz_body_side(&side, xyz, node, w->model, w->outer.face[p->side]);
+    uz_body_side(&side, xyz, node, w->model, w->outer->face[p->side]);
     gather(xyz, node, w, s, p->side);
     side.xyz = xyz;
     uz_side_shape(N, &side, p->local);
@@ -312,7 +312,7 @@ static uz_status look(work *w, int64_t side, int64_t node, const double local[2]
     const uz_mesh *mesh = &w->model->mesh;
     int64_t own[UZ_FACE_NODES], its[UZ_FACE_NODES];
     double xyz[3 * UZ_FACE_NODES];
-    const int mine = uz_mesh_face(own, mesh, w->outer.face[side]), count = gather(xyz, its, w, &w->now, passed);
+    const int mine = uz_mesh_face(own, mesh, w->outer->face[side]), count = gather(xyz, its, w, &w->now, passed);
     const double length = length_of(xyz, count, mesh->dim);
     if (!(depth > PASSED * fmin(p.length, length)) ||
         (are_joined(w, own, mine, its, count) && !(depth > LEFT * fmax(p.length, length))))
@@ -404,12 +404,6 @@ static bool meet_side(void *ctx, int64_t item)
     return p->n == MOST_CROSSINGS;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Looks along the edge of an outer side between its corners a and b; middle: its place among the side's nodes, -1:
  * there is none. */
 static uz_status look_along(work *w, int64_t side, int a, int b, int middle, const uz_side *of, const int64_t *node,
@@ -434,7 +428,7 @@ static uz_status look_along(work *w, int64_t side, int a, int b, int middle, con
     }
     for (int k = 0; k <= QUARTERS; k++)
         at[p.n++] = (double)k / QUARTERS;
-    qsort(at, (size_t)p.n, sizeof *at, by_value);
+    qsort(at, (size_t)p.n, sizeof *at, uz_ascending_real);
     for (int k = 1; k < p.n && status == UZ_OK; k++) {
         const double t = 0.5 * (at[k - 1] + at[k]);
         double point[2] = {(1 - t) * local[a][0] + t * local[b][0], (1 - t) * local[a][1] + t * local[b][1]};
@@ -453,7 +447,7 @@ static uz_status look_at_side(work *w, int64_t i, unsigned char *seen, uz_error 
     uz_side side;
     double xyz[3 * UZ_FACE_NODES];
     int64_t node[UZ_FACE_NODES];
-    uz_body_side(&side, xyz, node, w->model, w->outer.face[i]);
+    uz_body_side(&side, xyz, node, w->model, w->outer->face[i]);
     const int dim = side.dim, corners = uz_face_corners(dim, side.nodes);
     const double(*local)[3] = uz_side_local_nodes(&side);
     const double middle[2] = {dim == 2 ? 0 : corners == 3 ? 1.0 / 3 : 0, dim == 3 && corners == 3 ? 1.0 / 3 : 0};
@@ -491,10 +485,10 @@ static void mark_joins(work *w, const uz_scene *scene)
 }
 
 uz_status uz_find_interpenetration(uz_interpenetration *out, const uz_body_model *model, const uz_scene *scene,
-                                   const double *u, uz_error *err)
+                                   const uz_group *outer, const double *u, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    work w = {.model = model, .pairs = scene->n_ties, .out = out};
+    work w = {.model = model, .outer = outer, .pairs = scene->n_ties, .out = out};
     *out = (uz_interpenetration){.depth = 0};
     for (int64_t k = 0; k < scene->n_contacts; k++)
         w.pairs += scene->contacts[k].kind == UZ_OBSTACLE_BODY;
@@ -505,8 +499,6 @@ uz_status uz_find_interpenetration(uz_interpenetration *out, const uz_body_model
     uz_status status = UZ_OK;
     if (!seen || !w.part || !w.joins || !w.moved || uz_mesh_number_parts(w.part, mesh) < 0)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "%s", NO_MEMORY);
-    if (status == UZ_OK)
-        status = uz_outer_sides(&w.outer, mesh, err);
     if (status == UZ_OK) {
         mark_joins(&w, scene);
         for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
@@ -514,13 +506,12 @@ uz_status uz_find_interpenetration(uz_interpenetration *out, const uz_body_model
         w.now.xyz = w.moved;
         status = make_shape(&w.now, &w, err);
     }
-    for (int64_t i = 0; i < w.outer.n_faces && status == UZ_OK; i++)
+    for (int64_t i = 0; i < w.outer->n_faces && status == UZ_OK; i++)
         status = look_at_side(&w, i, seen, err);
     uz_box_tree_clear(&w.now.elements);
     uz_box_tree_clear(&w.now.sides);
     uz_box_tree_clear(&w.rest.elements);
     uz_box_tree_clear(&w.rest.sides);
-    free(w.outer.face);
     free(seen);
     free(w.part);
     free(w.joins);

@@ -13,9 +13,9 @@ typedef struct {
 } uz_interpenetration;
 
 /* The deepest that any point of the boundary of the body, displaced by u (n_nodes x dim), is inside of the body, beyond
- * what it was at rest. All outer sides are looked at, whatever the contacts name; what contacts and ties leave of the
- * surfaces that they join is none. O(n log n) for n elements. Error: UZ_ERR_MEMORY. */
+ * what it was at rest. All outer sides (outer: uz_outer_sides) are looked at, whatever the contacts name; what contacts
+ * and ties leave of the surfaces that they join is none. O(n log n) for n elements. Error: UZ_ERR_MEMORY. */
 uz_status uz_find_interpenetration(uz_interpenetration *out, const uz_body_model *model, const uz_scene *scene,
-                                   const double *u, uz_error *err);
+                                   const uz_group *outer, const double *u, uz_error *err);
 
 #endif

@@ -248,7 +248,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
     if (status == UZ_OK)
         status = check_ties(&run->base, &run->scene, err);
-    if (status == UZ_OK && uz_has_pairs(&run->scene))
+    if (status == UZ_OK)
         status = uz_outer_sides(&run->outer, &run->base.mesh, err);
     if (status == UZ_OK)
         status = check_turns(run, err);
@@ -386,7 +386,7 @@ static uz_status begin_near(uz_finite_run *run, uz_error *err)
 static uz_status look_for_passing(uz_finite_run *run, double t, uz_error *err)
 {
     uz_interpenetration now;
-    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, run->at.u, err);
+    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, &run->outer, run->at.u, err);
     if (status == UZ_OK && now.depth > run->passed.depth) {
         run->passed = now;
         run->passed_under = t;

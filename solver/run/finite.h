@@ -130,8 +130,8 @@ typedef struct {
      * supports and loads are; 0 until a part of the load is asked for */
     double *overlap;
     uz_body_model base, tangent;
+    uz_group outer;   /* all outer sides */
     bool pairs;       /* there is contact between bodies: */
-    uz_group outer;   /* all outer sides then */
     uz_csc wide;      /* the tangent's K with entries of their rows */
     const uz_csc *K;  /* of the last contact problem: that, or the tangent's own */
     uz_row_turn turn; /* of these rows at run->at */

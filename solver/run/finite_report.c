@@ -223,7 +223,7 @@ static void balance(uz_summary *s, const uz_finite_run *run)
 static uz_status doubt_passing(uz_evaluation *out, const uz_finite_run *run, uz_error *err)
 {
     uz_interpenetration now;
-    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, run->at.u, err);
+    const uz_status status = uz_find_interpenetration(&now, &run->base, &run->scene, &run->outer, run->at.u, err);
     const bool ends = now.depth > 0;
     if (status == UZ_OK)
         uz_doubt_interpenetration(out, ends ? &now : &run->passed, run->base.mesh.dim, ends ? 1 : run->passed_under);
