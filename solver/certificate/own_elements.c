@@ -121,3 +121,12 @@ bool uz_own_may_meet(const uz_own_look *point, const double normal[3])
         return along < 0;
     return along < ALIKE * sqrt(uz_dot3(point->normal, point->normal) * uz_dot3(normal, normal));
 }
+
+bool uz_own_adjoin(const int64_t *one, int n, const int64_t *other, int m)
+{
+    bool so = false;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < m; j++)
+            so = so || one[i] == other[j];
+    return so;
+}

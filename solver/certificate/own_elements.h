@@ -31,6 +31,9 @@ typedef struct {
 /* May it be before a side with this normal, or, held, have passed it? */
 bool uz_own_may_meet(const uz_own_look *point, const double normal[3]);
 
+/* Have two sides, of n and m nodes, a node in common? */
+bool uz_own_adjoin(const int64_t *one, int n, const int64_t *other, int m);
+
 /* Less than this part of a side behind another one a point touches it, though it is within no element. */
 #define UZ_OWN_TOUCHES 1e-5
 

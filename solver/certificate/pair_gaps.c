@@ -110,15 +110,6 @@ static void normal_at(double normal[3], const curve *c, double s)
     }
 }
 
-static bool have_common_node(const curve *a, const curve *b)
-{
-    bool so = false;
-    for (int i = 0; i < a->nodes; i++)
-        for (int j = 0; j < b->nodes; j++)
-            so = so || a->node[i] == b->node[j];
-    return so;
-}
-
 /* From the point at s; elements without xyz: the two surfaces are of two bodies. */
 static void look_from(double *least, double *part, const curve *own, double s, const curve *other, int64_t n,
                       const uz_own_elements *elements)
@@ -128,11 +119,13 @@ static void look_from(double *least, double *part, const curve *own, double s, c
     double x[2];
     curve_at(x, own, s);
     uz_own_look looks = {.held = itself && uz_own_elements_hold(elements, x)};
-    normal_at(looks.normal, own, s);
+    if (itself)
+        normal_at(looks.normal, own, s);
     for (int64_t i = 0; i < n; i++) {
         const curve *c = &other[i];
         const double from = sqrt(uz_distance2(x, c->middle, 2)) - c->reach;
-        if (from > at.distance + SAME * c->length || (itself && have_common_node(own, c)))
+        if (from > at.distance + SAME * c->length ||
+            (itself && uz_own_adjoin(own->node, own->nodes, c->node, c->nodes)))
             continue;
         for (int q = 0; q < c->chords; q++)
             look_at_chord(&at, x, itself ? &looks : NULL, c->at[q], c->at[q + 1], c->length);

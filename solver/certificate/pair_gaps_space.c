@@ -264,15 +264,6 @@ static void normal_at(double normal[3], const sheet *s, double k, double l)
     uz_cross3(normal, along[0], along[1]);
 }
 
-static bool have_common_node(const sheet *a, const sheet *b)
-{
-    bool so = false;
-    for (int i = 0; i < a->nodes; i++)
-        for (int j = 0; j < b->nodes; j++)
-            so = so || a->node[i] == b->node[j];
-    return so;
-}
-
 /* From the point (k, l) of a face. */
 static void look_from(double *least, double *part, const sheet *own, double k, double l, const sheet *other, int64_t n,
                       const uz_own_elements *elements)
@@ -282,13 +273,14 @@ static void look_from(double *least, double *part, const sheet *own, double k, d
     double x[3];
     place_at(x, own, k, l);
     uz_own_look looks = {.held = itself && uz_own_elements_hold(elements, x)};
-    normal_at(looks.normal, own, k, l);
+    if (itself)
+        normal_at(looks.normal, own, k, l);
     /* first the one that may be the nearest, as beside it there is little to look at in most of the others */
     int64_t first = -1;
     double least_far = INFINITY;
     for (int64_t i = 0; i < n; i++) {
         const double far = sqrt(uz_distance2(x, other[i].middle, 3)) - other[i].reach;
-        if (far < least_far && !(itself && have_common_node(own, &other[i]))) {
+        if (far < least_far && !(itself && uz_own_adjoin(own->node, own->nodes, other[i].node, other[i].nodes))) {
             least_far = far;
             first = i;
         }
@@ -296,7 +288,7 @@ static void look_from(double *least, double *part, const sheet *own, double k, d
     for (int64_t q = 0; q < n && first >= 0; q++) {
         const int64_t i = q == 0 ? first : q <= first ? q - 1 : q;
         if (sqrt(uz_distance2(x, other[i].middle, 3)) - other[i].reach <= at.distance + SAME * other[i].length &&
-            !(itself && have_common_node(own, &other[i])))
+            !(itself && uz_own_adjoin(own->node, own->nodes, other[i].node, other[i].nodes)))
             look_at_sheet(&at, x, itself ? &looks : NULL, &other[i]);
     }
     if (!isfinite(at.distance) || (at.border && !at.before && !looks.held))
