@@ -15,33 +15,15 @@ void uz_mesh_info_clear(uz_mesh_info *info)
 {
     if (!info)
         return;
-    free(info->xyz);
-    free(info->contact_node);
-    free(info->contact_area);
-    free(info->contact_normal);
-    free(info->contact_of);
-    free(info->contact_face);
-    free(info->rotated_node);
-    free(info->frame);
+    uz_free_all(info->xyz, info->contact_node, info->contact_area, info->contact_normal, info->contact_of,
+                info->contact_face, info->rotated_node, info->frame);
     memset(info, 0, sizeof *info);
 }
 
 void uz_contact_sites_clear(uz_contact_sites *sites)
 {
-    free(sites->gap);
-    free(sites->normal);
-    free(sites->first);
-    free(sites->node);
-    free(sites->weight);
-    free(sites->face);
-    free(sites->at);
-    free(sites->area);
-    free(sites->ends);
-    free(sites->zone);
-    free(sites->rank);
-    free(sites->of);
-    free(sites->inner);
-    free(sites->flank);
+    uz_free_all(sites->gap, sites->normal, sites->first, sites->node, sites->weight, sites->face, sites->at,
+                sites->area, sites->ends, sites->zone, sites->rank, sites->of, sites->inner, sites->flank);
     *sites = (uz_contact_sites){.n = 0};
 }
 
@@ -71,15 +53,8 @@ void uz_body_model_clear(uz_body_model *model)
         uz_mesh_clear(&model->mesh);
         uz_csc_clear(&model->K);
         uz_csc_clear(&model->K_fixed);
-        free(model->brick);
-        free(model->dof);
-        free(model->frame_of);
-        free(model->modes);
-        free(model->materials);
-        free(model->material_of);
-        free(model->spring);
-        free(model->rigid);
-        free(model->rigid_of);
+        uz_free_all(model->brick, model->dof, model->frame_of, model->modes, model->materials, model->material_of,
+                    model->spring, model->rigid, model->rigid_of);
         uz_followers_clear(&model->follow);
         uz_csc_clear(&model->tied.share);
     }

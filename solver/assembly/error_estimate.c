@@ -326,9 +326,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         sums.eta2 += fmax(0, least[e] - sums.eta2_of[e]);
         sums.eta2_of[e] = fmax(least[e], sums.eta2_of[e]);
     }
-    free(least);
-    free(own);
-    free(free_strain);
+    uz_free_all(least, own, free_strain);
     if (status != UZ_OK)
         return NAN;
     if (!(sums.whole > 0 && isfinite(sums.whole)))

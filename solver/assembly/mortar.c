@@ -80,10 +80,7 @@ const uz_mortar_side *uz_mortar_rest(const uz_mortar_surface *surface, const uz_
 void uz_mortar_surface_clear(uz_mortar_surface *surface)
 {
     uz_box_tree_clear(&surface->tree);
-    free(surface->side);
-    free(surface->node);
-    free(surface->normal);
-    free(surface->patch);
+    uz_free_all(surface->side, surface->node, surface->normal, surface->patch);
 }
 
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,

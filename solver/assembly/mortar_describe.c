@@ -137,8 +137,6 @@ bool uz_mortar_describe(uz_contact_surface *out, const uz_mortar_surface *surfac
         out->slope = shape->slope;
     }
 done:
-    free(part);
-    free(area);
-    free(bent);
+    uz_free_all(part, area, bent);
     return room;
 }

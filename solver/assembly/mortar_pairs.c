@@ -151,12 +151,7 @@ void uz_mortar_pair_clear(uz_mortar_pair *pair)
     uz_mortar_surface_clear(&pair->surface);
     uz_mortar_surface_clear(&pair->rest);
     uz_own_body_free(pair->own);
-    free(pair->group.face);
-    free(pair->of);
-    free(pair->points.point);
-    free(pair->near);
-    free(pair->ball);
-    free(pair->way);
+    uz_free_all(pair->group.face, pair->of, pair->points.point, pair->near, pair->ball, pair->way);
 }
 
 /* ---- the points of a side */
@@ -302,9 +297,7 @@ static int64_t number_zones(int64_t *zone, const uz_mortar_pair *pair)
             zone[i] = own[root];
         }
     }
-    free(of);
-    free(id);
-    free(used);
+    uz_free_all(of, id, used);
     return room ? count : -1;
 }
 
@@ -624,11 +617,7 @@ static bool divide_zones(int64_t *zone, int64_t *n_zones, uz_mortar_pair *pair)
             second[zone[i]] = second[zone[i]] ? second[zone[i]] : (*n_zones)++;
             zone[i] = second[zone[i]];
         }
-    free(across.pair);
-    free(sides.pair);
-    free(half);
-    free(queue);
-    free(second);
+    uz_free_all(across.pair, sides.pair, half, queue, second);
     return good;
 }
 

@@ -91,11 +91,7 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
         for (int c = 0; c < 3; c++)
             mine[c] = side * exact[c];
     }
-    free(part);
-    free(key);
-    free(shape);
-    free(xyz);
-    free(normal);
+    uz_free_all(part, key, shape, xyz, normal);
     return room;
 }
 

@@ -206,9 +206,7 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
     if (r && how == UZ_CONTINUE_LINEAR)
         seen = uz_alloc_zero(out->count, 1);
     if (!r || (how == UZ_CONTINUE_LINEAR && !seen)) {
-        free(head);
-        free(next);
-        free(r);
+        uz_free_all(head, next, r);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strain at %lld nodes", (long long)mesh->n_nodes);
     }
     r->out = out;
@@ -227,18 +225,13 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
         lower_alone(out, seen, model, from->free_strain);
     if (status == UZ_OK && mesh->hangs)
         follow(out, mesh, head, next);
-    free(seen);
-    free(head);
-    free(next);
+    uz_free_all(seen, head, next);
     return status;
 }
 
 void uz_nodal_strains_clear(uz_nodal_strains *strains)
 {
-    free(strains->of);
-    free(strains->node);
-    free(strains->material);
-    free(strains->rows);
+    uz_free_all(strains->of, strains->node, strains->material, strains->rows);
     memset(strains, 0, sizeof *strains);
 }
 

@@ -703,9 +703,7 @@ static uz_status find_flanks(uz_contact_sites *sites, const uz_contact_input *in
             sites->gap[sites->n] = flank[MOST_FLANKS * i + k].gap;
             uz_put_normal(sites, sites->n++, flank[MOST_FLANKS * i + k].normal, dim);
         }
-    free(flank);
-    free(count);
-    free(place);
+    uz_free_all(flank, count, place);
     return status;
 }
 
@@ -747,10 +745,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         status = find_flanks(sites, in, obstacle, first, near, err);
     if (status == UZ_OK)
         status = find_inner(sites, in, obstacle, gaps, normals, err);
-    free(gaps);
-    free(normals);
-    free(near);
-    free(first);
+    uz_free_all(gaps, normals, near, first);
     uz_obstacle_free(obstacle);
     return status;
 }

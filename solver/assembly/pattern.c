@@ -171,9 +171,7 @@ static uz_status walk_columns(uz_body_model *model, neighbours *n, int64_t most,
     if (status == UZ_OK)
         uz_aside_share(fill_part, walks, parts);
     for (int p = 0; p < parts; p++) {
-        free(walks[p].seen);
-        free(walks[p].near);
-        free(walks[p].rows);
+        uz_free_all(walks[p].seen, walks[p].near, walks[p].rows);
     }
     return status;
 }
@@ -319,11 +317,6 @@ uz_status uz_build_pattern(uz_body_model *model, const uz_scene *scene, uz_error
     } else {
         uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);
     }
-    free(n.ptr);
-    free(n.ptr_fixed);
-    free(n.first);
-    free(n.node);
-    free(n.start);
-    free(n.around);
+    uz_free_all(n.ptr, n.ptr_fixed, n.first, n.node, n.start, n.around);
     return status;
 }

@@ -212,8 +212,6 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
     }
     for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
         free(*room[i]);
-    free(load);
-    free(s.barred);
-    free(s.passive);
+    uz_free_all(load, s.barred, s.passive);
     return status;
 }

@@ -276,10 +276,6 @@ uz_status uz_smooth_refined(uz_mesh *mesh, const uz_scene *scene, uz_error *err)
     for (int64_t k = 0; x.surface && k < 2 * scene->n_contacts; k++)
         uz_mortar_surface_clear(&x.surface[k]);
     uz_mesh_clear(&x.given.mesh);
-    free(x.surface);
-    free(x.last);
-    free(x.item);
-    free(x.way);
-    free(x.on_facet);
+    uz_free_all(x.surface, x.last, x.item, x.way, x.on_facet);
     return status;
 }

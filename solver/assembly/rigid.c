@@ -45,9 +45,7 @@ int64_t uz_carriers(const int64_t **node, const double **share, const uz_body_mo
 
 void uz_followers_clear(uz_followers *follow)
 {
-    free(follow->first);
-    free(follow->node);
-    free(follow->share);
+    uz_free_all(follow->first, follow->node, follow->share);
     *follow = (uz_followers){.first = NULL};
 }
 

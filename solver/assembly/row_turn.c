@@ -347,11 +347,7 @@ uz_status uz_row_turn_find(uz_row_turn *out, const uz_body_model *base, const uz
     uz_csc_clear(&w.beside);
     uz_csc_clear(&w.near);
     uz_csc_clear(&w.seen);
-    free(w.pressed);
-    free(w.color);
-    free(w.u);
-    free(w.way);
-    free(w.sum);
+    uz_free_all(w.pressed, w.color, w.u, w.way, w.sum);
     for (int s = 0; s < 2; s++) {
         free(side[s].at);
         free(side[s].gap);
@@ -443,9 +439,7 @@ uz_status uz_row_turn_along(bool *known, double *force, double *gap, const uz_bo
         uz_csc_gaxpy(change + d, &rows->N, 1, v);
     for (int64_t j = 0; j < w.n_pressed && *known; j++)
         gap[w.pressed[j]] += change[d + w.pressed[j]];
-    free(w.u);
-    free(w.pressed);
-    free(change);
+    uz_free_all(w.u, w.pressed, change);
     return status;
 }
 

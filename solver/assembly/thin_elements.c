@@ -336,10 +336,6 @@ uz_status uz_thin_elements_errors(double **least, const uz_scene *scene, const u
         x.volume = NULL;
     }
     uz_corner_table_clear(&x.sides);
-    free(held);
-    free(x.known);
-    free(x.stress);
-    free(x.off);
-    free(x.volume);
+    uz_free_all(held, x.known, x.stress, x.off, x.volume);
     return status;
 }

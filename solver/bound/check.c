@@ -173,9 +173,7 @@ static uz_status conclude(uz_bound_check_result *out, const examination *element
         look_at_sums(&x, scale, apart, strained);
     }
     out->pressure = x.pressure;
-    free(x.resultant);
-    free(x.lift);
-    free(x.moved);
+    uz_free_all(x.resultant, x.lift, x.moved);
     if (status != UZ_OK)
         uz_bound_check_clear(out);
     return status;
@@ -229,10 +227,7 @@ uz_status uz_bound_potential(double *potential, double *strain, double *margin, 
 
 void uz_bound_check_clear(uz_bound_check_result *result)
 {
-    free(result->residual);
-    free(result->lifted);
-    free(result->pressure);
-    free(result->local);
+    uz_free_all(result->residual, result->lifted, result->pressure, result->local);
     result->residual = result->lifted = result->pressure = result->local = NULL;
 }
 

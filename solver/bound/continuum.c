@@ -89,15 +89,8 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
 
 void uz_bound_body_clear(uz_bound_body *body)
 {
-    free(body->edge);
-    free(body->edge_of);
-    free(body->segment);
-    free(body->before.at);
-    free(body->force);
-    free(body->free_strain);
-    free(body->motion);
-    free(body->map);
-    free(body->map_at);
+    uz_free_all(body->edge, body->edge_of, body->segment, body->before.at, body->force, body->free_strain, body->motion,
+                body->map, body->map_at);
     *body = (uz_bound_body){.model = NULL};
 }
 

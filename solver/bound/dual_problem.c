@@ -404,9 +404,7 @@ static uz_status add_rows(uz_qp *qp, int64_t d, const uz_bound_body *body, const
             add_pair_rows(&N, body, dof, k);
     if (status == UZ_OK)
         status = uz_csc_from_triplets(&qp->N, N.m, d, N.count, N.row, N.col, N.val, err);
-    free(N.row);
-    free(N.col);
-    free(N.val);
+    uz_free_all(N.row, N.col, N.val);
     return status;
 }
 
@@ -526,9 +524,7 @@ uz_status uz_bound_keep_maps(uz_bound_body *body, const uz_stop *stop, uz_error 
         free(body->map);
         body->map = NULL;
     }
-    free(plain.force);
-    free(kept);
-    free(order);
+    uz_free_all(plain.force, kept, order);
     return memory ? status
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stresses of %lld elements", (long long)n);
 }

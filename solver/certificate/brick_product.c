@@ -60,9 +60,7 @@ static void clear(whole *w)
 {
     for (int slab = 0; slab < w->slabs; slab++)
         for (int k = 0; k < 2; k++) {
-            free(w->of[slab].x[k]);
-            free(w->of[slab].hi[k]);
-            free(w->of[slab].lo[k]);
+            uz_free_all(w->of[slab].x[k], w->of[slab].hi[k], w->of[slab].lo[k]);
         }
 }
 

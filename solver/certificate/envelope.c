@@ -84,10 +84,7 @@ static bool order_dofs(int64_t *place, const uz_csc *A)
     }
     for (int64_t k = 0; k < n && room; k++)
         place[order[k]] = n - 1 - k;
-    free(g.first);
-    free(g.next);
-    free(order);
-    free(mark);
+    uz_free_all(g.first, g.next, order, mark);
     return room;
 }
 
@@ -212,9 +209,6 @@ void uz_envelope_forward(double *x, const uz_envelope *f, double *room)
 
 void uz_envelope_clear(uz_envelope *factor)
 {
-    free(factor->place);
-    free(factor->end);
-    free(factor->start);
-    free(factor->L);
+    uz_free_all(factor->place, factor->end, factor->start, factor->L);
     memset(factor, 0, sizeof *factor);
 }

@@ -73,10 +73,7 @@ bool uz_feasible_init(uz_feasible *c, const uz_csc *Nt, const double *weight)
 
 void uz_feasible_clear(uz_feasible *c)
 {
-    free(c->size);
-    free(c->correction);
-    free(c->push);
-    free(c->gap);
+    uz_free_all(c->size, c->correction, c->push, c->gap);
     uz_row_move_clear(&c->move);
 }
 

@@ -691,10 +691,6 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
         uz_csc_clear(&w.wide);
     else
         free(w.tangent.K.val);
-    free(w.tangent.K_fixed.val);
-    free(w.force);
-    free(w.f);
-    free(w.room);
-    free(w.size);
+    uz_free_all(w.tangent.K_fixed.val, w.force, w.f, w.room, w.size);
     return status;
 }

@@ -88,9 +88,7 @@ static uz_status compress(uz_lane_certifier *c, uz_error *err)
     }
     if (status == UZ_OK)
         status = uz_csc_from_triplets(&c->K_b, K->cols, c->n_b, count, row, column, value, err);
-    free(row);
-    free(column);
-    free(value);
+    uz_free_all(row, column, value);
     return status;
 }
 
@@ -146,18 +144,7 @@ void uz_lane_certifier_free(uz_lane_certifier *c)
     uz_feasible_clear(&c->feasible);
     uz_csc_clear(&c->Nt_b);
     uz_csc_clear(&c->K_b);
-    free(c->weight);
-    free(c->dof);
-    free(c->place);
-    free(c->weight_b);
-    free(c->u_b);
-    free(c->c);
-    free(c->Kc);
-    free(c->r);
-    free(c->hi);
-    free(c->lo);
-    free(c->E);
-    free(c);
+    uz_free_all(c->weight, c->dof, c->place, c->weight_b, c->u_b, c->c, c->Kc, c->r, c->hi, c->lo, c->E, c);
 }
 
 /* hi + lo += a x, lane by lane: dd_add_product of double_double.h. */

@@ -71,9 +71,7 @@ uz_status uz_own_elements_init(uz_own_elements *out, const uz_body_model *model,
 
 void uz_own_elements_clear(uz_own_elements *own)
 {
-    free(own->xyz);
-    free(own->box);
-    free(own->near);
+    uz_free_all(own->xyz, own->box, own->near);
     memset(own, 0, sizeof *own);
 }
 

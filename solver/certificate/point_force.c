@@ -201,10 +201,7 @@ static uz_status add(double *f, uz_body_model *tangent, const uz_finite_answer *
         for (int c = 0; c < dim; c++)
             f[dim * a + c] += (double)(x.share[a] * (load->v[c] + turned[c]));
     }
-    free(C);
-    free(room);
-    free(x.share);
-    free(x.r);
+    uz_free_all(C, room, x.share, x.r);
     return status;
 }
 

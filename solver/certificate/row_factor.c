@@ -96,9 +96,7 @@ void uz_row_factor_order(uz_row_factor *f, int64_t *rows, int64_t n)
             memcpy(rows, order, (size_t)n * sizeof *rows);
         }
     }
-    free(ptr);
-    free(idx);
-    free(order);
+    uz_free_all(ptr, idx, order);
 }
 
 static void backward(uz_row_factor *f, double *x)

@@ -57,3 +57,9 @@ bool uz_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size
     *room = wanted;
     return true;
 }
+
+void uz_free_each(void *const *blocks, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        free(blocks[i]);
+}

@@ -24,4 +24,8 @@ void *uz_realloc(void *block, int64_t count, size_t size);
  * where there is too little, by half at least. False: no memory, and the list stays. */
 bool uz_grow(void *list, int64_t count, int64_t more, int64_t *room, size_t size);
 
+/* free() of each argument, in their order. */
+#define uz_free_all(...) uz_free_each((void *[]){__VA_ARGS__}, sizeof(void *[]){__VA_ARGS__} / sizeof(void *))
+void uz_free_each(void *const *blocks, size_t count);
+
 #endif

@@ -34,12 +34,7 @@ void uz_dual_block_free(uz_dual_block *block)
 {
     if (!block)
         return;
-    free(block->P);
-    free(block->U);
-    free(block->Y);
-    free(block->X);
-    free(block->room);
-    free(block);
+    uz_free_all(block->P, block->U, block->Y, block->X, block->room, block);
 }
 
 uz_status uz_dual_block_forward(uz_dual_block *block, uz_error *err)

@@ -158,9 +158,7 @@ static void clear(uz_dual *dual)
     free(dense->position);
     free(dense->L_bb);
     uz_reach_free(dense->reach);
-    free(dense->D_chol);
-    free(dense->row_of);
-    free(dense->scale);
+    uz_free_all(dense->D_chol, dense->row_of, dense->scale);
     if (dense->made) {
         free(dense->made->D);
         free(dense->made->D_inverse);
@@ -241,10 +239,7 @@ static void unload(uz_dual_load *load)
 {
     uz_condensed_load *x = (uz_condensed_load *)load;
     uz_factor_workspace_free(x->ws);
-    free(x->base);
-    free(x->apply_room);
-    free(x->work);
-    free(x->work2);
+    uz_free_all(x->base, x->apply_room, x->work, x->work2);
 }
 
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w)

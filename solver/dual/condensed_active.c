@@ -293,11 +293,7 @@ static bool correct_rows(uz_condensed_load *x, double *w, double *target, const 
             in[i] = in[i] || wrong;
         }
     }
-    free(rows);
-    free(pivot);
-    free(part);
-    free(in);
-    free(D_AA);
+    uz_free_all(rows, pivot, part, in, D_AA);
     return feasible;
 }
 

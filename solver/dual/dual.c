@@ -176,12 +176,7 @@ void uz_dual_load_free(uz_dual_load *load)
     if (!load)
         return;
     load->dual->form->unload(load);
-    free(load->h);
-    free(load->g0);
-    free(load->inside);
-    free(load->correction);
-    free(load->kept);
-    free(load);
+    uz_free_all(load->h, load->g0, load->inside, load->correction, load->kept, load);
 }
 
 uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_stop *stop, uz_error *err)

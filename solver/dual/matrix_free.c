@@ -164,9 +164,7 @@ static void unload(uz_dual_load *load)
 {
     free_load *x = (free_load *)load;
     uz_cg_clear(&x->cg);
-    free(x->right);
-    free(x->u);
-    free(x->r);
+    uz_free_all(x->right, x->u, x->r);
     uz_sparse_unload(&x->sparse);
 }
 

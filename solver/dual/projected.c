@@ -76,10 +76,7 @@ static uz_status make_matrix(uz_csc *G, const uz_projected *x, uz_error *err)
         if (pass == 0)
             status = uz_csc_init(G, n, n, at, err);
     }
-    free(place);
-    free(met);
-    free(seen);
-    free(sum);
+    uz_free_all(place, met, seen, sum);
     return status;
 }
 
@@ -225,12 +222,7 @@ void uz_projected_free(uz_projected *x)
         return;
     uz_factor_free(x->factor);
     uz_factor_workspace_free(x->ws);
-    free(x->row);
-    free(x->b);
-    free(x->y);
-    free(x->room);
-    free(x->e);
-    free(x);
+    uz_free_all(x->row, x->b, x->y, x->room, x->e, x);
 }
 
 size_t uz_projected_bytes(const uz_projected *x)

@@ -67,10 +67,6 @@ uz_status uz_ray_project(double *y, const uz_csc *N, uz_error *err)
     } else {
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to look for contradicting rows");
     }
-    free(ls.s);
-    free(ls.direction);
-    free(ls.image);
-    free(ls.best);
-    free(support);
+    uz_free_all(ls.s, ls.direction, ls.image, ls.best, support);
     return status;
 }

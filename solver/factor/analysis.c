@@ -81,10 +81,7 @@ void uz_analysis_free(uz_analysis *analysis)
         cholmod_l_finish(&common);
     }
     uz_refill_free(atomic_load(&analysis->spare));
-    free(analysis->last);
-    free(analysis->position);
-    free(analysis->share);
-    free(analysis);
+    uz_free_all(analysis->last, analysis->position, analysis->share, analysis);
 }
 
 uz_factor_info uz_analysis_describe(const uz_analysis *analysis)

@@ -129,9 +129,6 @@ uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t 
         if (status == UZ_OK && per_edge > FLOPS_PER_EDGE && per_edge > NOT_PLANAR * sqrt((double)c.groups))
             status = consider_forms(&c, UZ_ORDERING_METIS, UZ_ORDERING_METIS, err);
     }
-    free(seen);
-    free(c.perm);
-    free(c.metis);
-    free(c.last);
+    uz_free_all(seen, c.perm, c.metis, c.last);
     return status;
 }

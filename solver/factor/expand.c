@@ -101,8 +101,6 @@ cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t
         write_rows(L, G, start, room);
     else
         cholmod_l_free_factor(&L, common);
-    free(first);
-    free(start);
-    free(room);
+    uz_free_all(first, start, room);
     return L;
 }

@@ -170,10 +170,7 @@ void uz_principal_free(uz_principal *part)
     cholmod_l_free_dense(&part->Y, common);
     cholmod_l_free_dense(&part->E, common);
     uz_paths_free(part->paths);
-    free(part->dof);
-    free(part->place);
-    free(part->room);
-    free(part);
+    uz_free_all(part->dof, part->place, part->room, part);
 }
 
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)

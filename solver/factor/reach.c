@@ -64,9 +64,7 @@ double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_do
         if (parent >= 0)
             below[parent] += below[s];
     }
-    free(touched);
-    free(owner);
-    free(below);
+    uz_free_all(touched, owner, below);
     return flops;
 }
 
@@ -124,9 +122,7 @@ void uz_reach_free(uz_reach *reach)
 {
     if (!reach)
         return;
-    free(reach->node);
-    free(reach->parent);
-    free(reach);
+    uz_free_all(reach->node, reach->parent, reach);
 }
 
 uz_status uz_reach_forward(const uz_reach *reach, uz_factor_workspace *ws, double *x, uz_error *err)
@@ -285,11 +281,7 @@ uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_er
         free(g.shares[k].column);
         free(g.shares[k].block);
     }
-    free(g.shares);
-    free(g.child);
-    free(g.slot);
-    free(g.local);
-    free(g.gram);
+    uz_free_all(g.shares, g.child, g.slot, g.local, g.gram);
     if (ok)
         return UZ_OK;
     return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);

@@ -439,21 +439,11 @@ static uz_status to_given(uz_given_mesh *out, abaqus_file *file, int64_t **new_e
 void abaqus_clear(abaqus_file *file)
 {
     for (int64_t i = 0; i < file->n_sets; i++) {
-        free(file->sets[i].item);
-        free(file->members ? file->members[i].index : NULL);
-        free(file->members ? file->members[i].face : NULL);
+        uz_free_all(file->sets[i].item, file->members ? file->members[i].index : NULL,
+                    file->members ? file->members[i].face : NULL);
     }
-    free(file->members);
-    free(file->sets);
-    free(file->nodes.tag);
-    free(file->nodes.by_tag);
-    free(file->elements.tag);
-    free(file->elements.by_tag);
-    free(file->xyz);
-    free(file->type);
-    free(file->line);
-    free(file->first);
-    free(file->node);
+    uz_free_all(file->members, file->sets, file->nodes.tag, file->nodes.by_tag, file->elements.tag,
+                file->elements.by_tag, file->xyz, file->type, file->line, file->first, file->node);
 }
 
 uz_status abaqus_read_mesh(uz_given_mesh *out, abaqus_file *file, int64_t **new_element)

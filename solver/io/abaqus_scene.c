@@ -175,10 +175,7 @@ static void keep_in_groups(uz_given_mesh *mesh, const int64_t *new_node)
             mesh->groups[kept++] = *group;
             continue;
         }
-        free(group->node);
-        free(group->face_first);
-        free(group->face_node);
-        free(group->element);
+        uz_free_all(group->node, group->face_first, group->face_node, group->element);
     }
     mesh->n_groups = kept;
 }
@@ -797,20 +794,8 @@ static bool make_room(abaqus_deck *d)
 
 static void clear_deck(abaqus_deck *d)
 {
-    free(d->materials);
-    free(d->amplitudes);
-    free(d->pairs);
-    free(d->tied);
-    free(d->springs);
-    free(d->pressures);
-    free(d->rigids);
-    free(d->fixed);
-    free(d->force);
-    free(d->temperature);
-    free(d->initial);
-    free(d->material);
-    free(d->gravity);
-    free(d->body_force);
+    uz_free_all(d->materials, d->amplitudes, d->pairs, d->tied, d->springs, d->pressures, d->rigids, d->fixed, d->force,
+                d->temperature, d->initial, d->material, d->gravity, d->body_force);
 }
 
 void uz_deck_clear(uz_deck *deck)

@@ -446,10 +446,7 @@ static uz_status add_groups(set_work *w, int64_t s)
         if (status == UZ_OK && made[k].name[0]) {
             w->out->groups[w->out->n_groups++] = made[k];
         } else {
-            free(made[k].node);
-            free(made[k].face_first);
-            free(made[k].face_node);
-            free(made[k].element);
+            uz_free_all(made[k].node, made[k].face_first, made[k].face_node, made[k].element);
         }
     return status;
 }

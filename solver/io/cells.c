@@ -250,10 +250,5 @@ void cells_clear(cells *mesh)
 {
     for (int64_t i = 0; i < mesh->n_sets; i++)
         free(mesh->sets[i].index);
-    free(mesh->sets);
-    free(mesh->xyz);
-    free(mesh->shape);
-    free(mesh->line);
-    free(mesh->first);
-    free(mesh->node);
+    uz_free_all(mesh->sets, mesh->xyz, mesh->shape, mesh->line, mesh->first, mesh->node);
 }

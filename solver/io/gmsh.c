@@ -319,15 +319,7 @@ uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t 
         status = to_given(out, &file);
     if (status != UZ_OK)
         uz_given_mesh_clear(out);
-    free(file.xyz);
-    free(file.tag);
-    free(file.by_tag);
-    free(file.type);
-    free(file.part_tag);
-    free(file.first);
-    free(file.node);
-    free(file.parts);
-    free(file.physical);
-    free(file.names);
+    uz_free_all(file.xyz, file.tag, file.by_tag, file.type, file.part_tag, file.first, file.node, file.parts,
+                file.physical, file.names);
     return status;
 }

@@ -493,12 +493,6 @@ uz_status uz_nastran_read(uz_given_mesh *out, const char *text, size_t len, size
     if (status == UZ_OK)
         status = cells_to_given(out, &n.mesh, "/mesh/nastran", "mesh a solid with CTETRA, CPENTA, CHEXA");
     cells_clear(&n.mesh);
-    free(n.field);
-    free(n.grids.tag);
-    free(n.grids.by_tag);
-    free(n.elements.tag);
-    free(n.elements.by_tag);
-    free(n.property);
-    free(n.part);
+    uz_free_all(n.field, n.grids.tag, n.grids.by_tag, n.elements.tag, n.elements.by_tag, n.property, n.part);
     return status;
 }

@@ -241,9 +241,7 @@ static uz_status read_sparse(uz_csc *out, npz_file *file, size_t limit, uz_error
     }
     if (status == UZ_OK)
         status = uz_csc_from_triplets(out, from.rows, from.cols, from.entries, row, col, val, err);
-    free(row);
-    free(col);
-    free(val);
+    uz_free_all(row, col, val);
     return status;
 }
 

@@ -18,9 +18,7 @@ static const struct {
 
 void uz_triangles_clear(uz_triangles *triangles)
 {
-    free(triangles->x);
-    free(triangles->y);
-    free(triangles->z);
+    uz_free_all(triangles->x, triangles->y, triangles->z);
     memset(triangles, 0, sizeof *triangles);
 }
 

@@ -40,9 +40,7 @@ void uz_csc_clear(uz_csc *A)
 {
     if (!A)
         return;
-    free(A->ptr);
-    free(A->idx);
-    free(A->val);
+    uz_free_all(A->ptr, A->idx, A->val);
     memset(A, 0, sizeof *A);
 }
 
@@ -243,8 +241,6 @@ uz_status uz_csc_from_entries(uz_csc *out, int64_t rows, int64_t cols, uz_entrie
 
 void uz_entries_clear(uz_entries *entries)
 {
-    free(entries->row);
-    free(entries->col);
-    free(entries->val);
+    uz_free_all(entries->row, entries->col, entries->val);
     *entries = (uz_entries){.n = 0};
 }

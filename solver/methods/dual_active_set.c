@@ -121,9 +121,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
 done:
     uz_exchange_free(x.way[0]);
     uz_exchange_free(x.way[1]);
-    free(x.active);
-    free(x.r);
-    free(x.g);
+    uz_free_all(x.active, x.r, x.g);
     return status;
 }
 

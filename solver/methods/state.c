@@ -17,13 +17,7 @@ void uz_state_free(uz_state *state)
 {
     if (!state)
         return;
-    free(state->r);
-    free(state->rho);
-    free(state->Dr);
-    free(state->Drho);
-    free(state->best_r);
-    free(state->anchor);
-    free(state);
+    uz_free_all(state->r, state->rho, state->Dr, state->Drho, state->best_r, state->anchor, state);
 }
 
 /* Lengths of the rows to scaled ones, and scaled forces back: to = from x scale. The other way by dividing. */

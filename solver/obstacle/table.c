@@ -252,9 +252,7 @@ uz_status uz_table_init(uz_table *out, const uz_contact *contact, double scale, 
 
 void uz_table_clear(uz_table *table)
 {
-    free(table->x);
-    free(table->y);
-    free(table->z);
+    uz_free_all(table->x, table->y, table->z);
     uz_box_tree_clear(&table->tree);
     memset(table, 0, sizeof *table);
 }

@@ -22,12 +22,7 @@
 
 void uz_triangulation_clear(uz_triangulation *t)
 {
-    free(t->point);
-    free(t->corner);
-    free(t->beside);
-    free(t->normal);
-    free(t->point_normal);
-    free(t->sagitta);
+    uz_free_all(t->point, t->corner, t->beside, t->normal, t->point_normal, t->sagitta);
     uz_box_tree_clear(&t->tree);
     memset(t, 0, sizeof *t);
 }

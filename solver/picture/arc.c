@@ -95,9 +95,6 @@ uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model
             part[i] = reached ? w.part[node] : w.parts;
         }
     }
-    free(w.next);
-    free(w.follows);
-    free(w.at);
-    free(w.part);
+    uz_free_all(w.next, w.follows, w.at, w.part);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of %lld contacts", (long long)m);
 }

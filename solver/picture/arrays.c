@@ -276,10 +276,7 @@ uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_fi
     uz_fields_clear(&w.fields);
     uz_skin_clear(&w.skin);
     uz_skin_edges_clear(&w.edges);
-    free(w.vertex_of);
-    free(w.drawn);
-    free(w.arc);
-    free(w.part);
+    uz_free_all(w.vertex_of, w.drawn, w.arc, w.part);
     uz_field_body_clear(&body);
     uz_body_model_clear(&model);
     if (status != UZ_OK)

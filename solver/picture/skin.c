@@ -211,9 +211,7 @@ uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_
         else
             collect_edges(out, &w, mesh->n_nodes);
     }
-    free(w.start);
-    free(w.half);
-    free(w.normal);
+    uz_free_all(w.start, w.half, w.normal);
     if (status != UZ_OK)
         uz_skin_edges_clear(out);
     return status;

@@ -96,12 +96,7 @@ void uz_block_free(uz_block *block)
         return;
     uz_dual_block_free(block->loads);
     uz_lane_certifier_free(block->certifier);
-    free(block->runs);
-    free(block->cases);
-    free(block->r);
-    free(block->corrected);
-    free(block->permuted);
-    free(block);
+    uz_free_all(block->runs, block->cases, block->r, block->corrected, block->permuted, block);
 }
 
 enum { TILE = 512 }; /* rows at a time: what is read and written by turns stays in the first cache */

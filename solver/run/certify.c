@@ -152,8 +152,6 @@ uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *
 
 void uz_answer_clear(uz_answer *answer)
 {
-    free(answer->u);
-    free(answer->r);
-    free(answer->g);
+    uz_free_all(answer->u, answer->r, answer->g);
     memset(answer, 0, sizeof *answer);
 }

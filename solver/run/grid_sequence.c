@@ -178,9 +178,7 @@ uz_status uz_solve_grid_sequence(uz_result **results, const uz_problem *problem,
     }
     if (status == UZ_OK)
         status = publish(&g, err);
-    free(g.spent);
-    free(g.seen);
-    free(g.bisected);
+    uz_free_all(g.spent, g.seen, g.bisected);
     for (int64_t i = 0; g.best.results && i < g.n_cases; i++)
         results[i] = g.best.results[i];
     free(g.best.results);
@@ -809,9 +807,7 @@ static void offer(search *g)
             free(copy[i].grids->bisected);
         free(copy[i].grids);
     }
-    free(shown);
-    free(copy);
-    free(evaluation);
+    uz_free_all(shown, copy, evaluation);
 }
 
 static uz_status publish(search *g, uz_error *err)

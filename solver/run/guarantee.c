@@ -175,9 +175,7 @@ static uz_status hold_where_stress_presses(uz_guaranteed *g, uz_error *err)
     }
     uz_result_free(soft);
     uz_qp_clear(&qp);
-    free(dof);
-    free(resultant);
-    free(at);
+    uz_free_all(dof, resultant, at);
     return status == UZ_ERR_MEMORY || status == UZ_ERR_CANCELLED ? status : UZ_OK;
 }
 
@@ -287,15 +285,7 @@ static void clear(uz_guaranteed *g)
 {
     uz_bound_body_clear(&g->body);
     uz_qp_clear(&g->qp);
-    free(g->dof);
-    free(g->stress);
-    free(g->pressing);
-    free(g->at);
-    free(g->lift);
-    free(g->cheap);
-    free(g->carried[0]);
-    free(g->carried[1]);
-    free(g->admissible);
+    uz_free_all(g->dof, g->stress, g->pressing, g->at, g->lift, g->cheap, g->carried[0], g->carried[1], g->admissible);
     uz_bound_check_clear(&g->checked);
     uz_bound_check_clear(&g->out_of_it);
 }

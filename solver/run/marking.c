@@ -143,9 +143,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
             grown[(*n)++] = all[i].element;
     }
     done = done && (grown || count == 0);
-    free(all);
-    free(eta2);
-    free(room);
+    uz_free_all(all, eta2, room);
     return done ? UZ_OK
                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to choose among %lld elements", (long long)n_elements);
 }

@@ -233,10 +233,7 @@ uz_status uz_solve_moving(uz_result **result, const uz_problem *problem, const u
     }
     uz_setup_release(m.cache, m.base);
     uz_cache_free(m.own_cache);
-    free(m.place);
-    free(m.v);
-    free(m.Kv);
-    free(m.before);
+    uz_free_all(m.place, m.v, m.Kv, m.before);
     const bool lasting = status == UZ_ERR_MEMORY || status == UZ_ERR_INTERNAL || !is_auto;
     if (status == UZ_ERR_CANCELLED || (status == UZ_OK && answered && !settled && uz_stop_is_due(&stop))) {
         give_up(*result, &m, uz_cancelled(hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT);

@@ -50,9 +50,7 @@ void uz_nearby_free(uz_nearby *x)
         return;
     for (int k = 0; k < BASIS; k++)
         free(x->basis[k]);
-    free(x->of);
-    free(x->room);
-    free(x);
+    uz_free_all(x->of, x->room, x);
 }
 
 /* The load in units in which neither forces nor gaps are all that counts. */

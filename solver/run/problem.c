@@ -1,6 +1,7 @@
 /* problem.c: checks on a problem, and its load cases one by one. */
 #include "run/problem.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/linalg.h"
 
@@ -204,9 +205,7 @@ void uz_problem_clear(uz_problem *problem)
     else
         uz_qp_clear(&problem->qp);
     for (int64_t i = 0; problem->cases && i < problem->n_cases; i++) {
-        free(problem->cases[i].p);
-        free(problem->cases[i].h);
-        free(problem->cases[i].loads);
+        uz_free_all(problem->cases[i].p, problem->cases[i].h, problem->cases[i].loads);
     }
     free(problem->cases);
     free(problem->quantities);

@@ -194,9 +194,7 @@ static uz_status iterate(adjoint *x, bool *solved, uz_dual_load *load, uz_error 
         rr = next;
         *solved = rr <= aim;
     }
-    free(r);
-    free(s);
-    free(Ds);
+    uz_free_all(r, s, Ds);
     return status;
 }
 

@@ -192,13 +192,7 @@ void uz_result_free(uz_result *result)
 {
     if (!result)
         return;
-    free(result->ray);
-    free(result->u);
-    free(result->r);
-    free(result->g);
-    free(result->pressure);
-    free(result->place);
-    free(result->free_strain);
+    uz_free_all(result->ray, result->u, result->r, result->g, result->pressure, result->place, result->free_strain);
     uz_evaluation_free(result->evaluation);
     free(result->history.rows);
     uz_state_free(result->state);

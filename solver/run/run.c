@@ -351,10 +351,7 @@ void uz_run_end(uz_run *run)
     uz_dual_load_free(run->work.dual);
     uz_iterate_clear(&run->work.it);
     uz_factor_workspace_free(run->work.ws);
-    free(run->work.scratch);
-    free(run->work.far);
-    free(run->load.owned);
-    free(run->near);
+    uz_free_all(run->work.scratch, run->work.far, run->load.owned, run->near);
     uz_answer_clear(&run->answer);
     uz_candidates_clear(&run->wants);
     uz_result_free(run->result);

@@ -130,9 +130,6 @@ double uz_mesh_breadth(const uz_mesh *mesh)
         unite(&x);
         breadth = sum_largest(&x, largest) / (LAYERS * fmax(1.0, slabs));
     }
-    free(x.slab);
-    free(x.above);
-    free(x.count);
-    free(largest);
+    uz_free_all(x.slab, x.above, x.count, largest);
     return breadth;
 }

@@ -159,9 +159,7 @@ uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool 
 
 void uz_corner_table_clear(uz_corner_table *table)
 {
-    free(table->start);
-    free(table->item);
-    free(table->same);
+    uz_free_all(table->start, table->item, table->same);
     memset(table, 0, sizeof *table);
 }
 

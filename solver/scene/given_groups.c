@@ -292,9 +292,7 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
                          "a group called \"all\" is not all elements of the mesh; give it another name");
     if (status == UZ_OK) {
         all = all ? all : &mesh->groups[mesh->n_groups++];
-        free(all->node);
-        free(all->face);
-        free(all->element);
+        uz_free_all(all->node, all->face, all->element);
         *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     }
     uz_corner_table_clear(&work.sides);

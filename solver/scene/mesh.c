@@ -13,21 +13,10 @@ void uz_mesh_clear(uz_mesh *mesh)
     if (!mesh)
         return;
     for (int64_t i = 0; mesh->groups && i < mesh->n_groups; i++) {
-        free(mesh->groups[i].node);
-        free(mesh->groups[i].face);
-        free(mesh->groups[i].element);
+        uz_free_all(mesh->groups[i].node, mesh->groups[i].face, mesh->groups[i].element);
     }
-    free(mesh->groups);
-    free(mesh->xyz);
-    free(mesh->kind);
-    free(mesh->first);
-    free(mesh->node);
-    free(mesh->from_first);
-    free(mesh->from);
-    free(mesh->from_share);
-    free(mesh->hangs);
-    free(mesh->part_of);
-    free(mesh->inside);
+    uz_free_all(mesh->groups, mesh->xyz, mesh->kind, mesh->first, mesh->node, mesh->from_first, mesh->from,
+                mesh->from_share, mesh->hangs, mesh->part_of, mesh->inside);
     memset(mesh, 0, sizeof *mesh);
 }
 

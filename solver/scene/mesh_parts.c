@@ -91,12 +91,7 @@ void uz_own_body_free(uz_own_body *own)
 {
     if (!own)
         return;
-    free(own->part);
-    free(own->first);
-    free(own->around);
-    free(own->seen);
-    free(own->queue);
-    free(own);
+    uz_free_all(own->part, own->first, own->around, own->seen, own->queue, own);
 }
 
 /* Does the straight way from x to y meet the box around an element? Curved edges leave the box of the nodes by no more

@@ -34,13 +34,7 @@ uz_status uz_refinement_end(uz_refinement *x, bool listed, uz_error *err)
             uz_fail(err, UZ_ERR_LIMIT, "/mesh/refine", "a refined mesh has more than %d unknowns", UZ_SCENE_MAX_DOFS);
     if (x->failed)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine a mesh of %lld elements", elements);
-    free(x->links);
-    free(x->users);
-    free(x->xyz);
-    free(x->from_first);
-    free(x->from);
-    free(x->from_share);
-    free(x->table);
+    uz_free_all(x->links, x->users, x->xyz, x->from_first, x->from, x->from_share, x->table);
     return status;
 }
 
@@ -248,10 +242,7 @@ static bool refine_group(uz_group *group, const heirs *h)
     for (int64_t i = 0, k = 0; i < n && out.node; i++)
         if (in[i])
             out.node[k++] = i;
-    free(in);
-    free(group->node);
-    free(group->face);
-    free(group->element);
+    uz_free_all(in, group->node, group->face, group->element);
     *group = out;
     return out.node != NULL;
 }
@@ -283,9 +274,7 @@ static bool refine_groups(const uz_refinement *x, uz_mesh *fine, const int64_t *
     for (int64_t k = 0; k < mesh->n_groups && room; k++)
         room = mesh->groups[k].everything || refine_group(&mesh->groups[k], &h);
     room = room && (!fine->hangs || list_inside(&h, fine));
-    free(h.outer_sides);
-    free(h.outer);
-    free(h.has);
+    uz_free_all(h.outer_sides, h.outer, h.has);
     return room;
 }
 
@@ -305,18 +294,10 @@ void uz_refinement_publish(uz_refinement *x, uz_mesh *fine, const int64_t *root,
     fine->n_nodes = x->nodes;
     x->failed = x->failed || !refine_groups(x, fine, root, side);
     if (x->failed) {
-        free(fine->kind);
-        free(fine->first);
-        free(fine->node);
-        free(fine->hangs);
-        free(fine->part_of);
-        free(fine->inside);
+        uz_free_all(fine->kind, fine->first, fine->node, fine->hangs, fine->part_of, fine->inside);
         return;
     }
-    free(mesh->xyz);
-    free(mesh->kind);
-    free(mesh->first);
-    free(mesh->node);
+    uz_free_all(mesh->xyz, mesh->kind, mesh->first, mesh->node);
     fine->dim = mesh->dim;
     fine->extent = mesh->extent;
     fine->n_unused = mesh->n_unused;
