@@ -2,6 +2,7 @@
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/text.h"
+#include "core/alloc.h"
 #include "run/problem.h"
 
 #include <math.h>
@@ -359,12 +360,7 @@ void codec_request_clear(codec_request *request)
     if (!request)
         return;
     uz_problem_clear(&request->problem);
-    free(request->start.reactions);
-    free(request->answer.u);
-    free(request->answer.r);
-    free(request->assertions);
-    free(request->tags);
-    free(request->uploads);
-    free(request->webhook);
+    uz_free_all(request->start.reactions, request->answer.u, request->answer.r, request->assertions, request->tags,
+                request->uploads, request->webhook);
     memset(request, 0, sizeof *request);
 }

@@ -1,5 +1,6 @@
 /* fields.c: turns of what is computed, and the computation. */
 #include "http/fields.h"
+#include "core/alloc.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -131,14 +132,7 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     answer.g = n_gaps == answer.m ? g : NULL;
     if (found == STORE_OK)
         status = scene.refine && !list ? UZ_ERR_MEMORY : run(out, &scene, &answer, which, &hooks, &err);
-    free(u);
-    free(r);
-    free(g);
-    free(cells);
-    free(place);
-    free(warm);
-    free(bisected);
-    free(list);
+    uz_free_all(u, r, g, cells, place, warm, bisected, list);
     if (found != STORE_OK)
         reply_store_failure(context, found, reply);
     else if (status != UZ_OK)

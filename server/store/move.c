@@ -1,5 +1,6 @@
 /* move.c: the order of a move, and the comparison at its end. */
 #include "store/move.h"
+#include "core/alloc.h"
 #include "store/engine_base.h"
 
 #include <gnutls/crypto.h>
@@ -13,12 +14,7 @@
 void moved_job_clear(moved_job *m)
 {
     job_clear(&m->job);
-    free(m->key);
-    free(m->share);
-    free(m->contents);
-    free(m->uploads);
-    free(m->url);
-    free(m->blobs);
+    uz_free_all(m->key, m->share, m->contents, m->uploads, m->url, m->blobs);
     memset(m, 0, sizeof *m);
 }
 

@@ -1,4 +1,5 @@
 #include "work/answers.h"
+#include "core/alloc.h"
 #include "work/judge.h"
 #include "work/overall.h"
 #include "work/state.h"
@@ -190,14 +191,8 @@ void answers_clear(answers *a)
 {
     for (int64_t i = a->parts ? 0 : a->n; i <= a->n; i++) {
         answer_parts *one = i < a->n ? &a->parts[i] : &a->shared;
-        free(one->summary);
-        free(one->history);
-        free(one->state);
-        free(one->contact_nodes);
+        uz_free_all(one->summary, one->history, one->state, one->contact_nodes);
     }
-    free(a->parts);
-    free(a->cases);
-    free(a->findings);
-    free(a->bisected);
+    uz_free_all(a->parts, a->cases, a->findings, a->bisected);
     *a = (answers){.n = 0};
 }

@@ -1,4 +1,5 @@
 #include "work/starts.h"
+#include "core/alloc.h"
 #include "work/state.h"
 #include "work/trade.h"
 
@@ -106,9 +107,6 @@ void starts_clear(starts *s)
         if (s->histories)
             free(s->histories[i]);
     }
-    free(s->states);
-    free(s->histories);
-    free(s->rows);
-    free(s->trades);
+    uz_free_all(s->states, s->histories, s->rows, s->trades);
     *s = (starts){.n = 0};
 }

@@ -4,6 +4,7 @@
 #define TESTS_SUPPORT_CG_STEPS_H
 
 #include "amg/amg.h"
+#include "core/alloc.h"
 #include "harness.h"
 
 #include <stdlib.h>
@@ -56,10 +57,7 @@ static inline void step_along(told *t, const uz_multigrid *mg, const uz_csc *K, 
             along[j] = z[j] + square / last * along[j];
         go_on = listen_to_step(t, alpha, last, square);
     }
-    free(r);
-    free(z);
-    free(along);
-    free(q);
+    uz_free_all(r, z, along, q);
 }
 
 /* kind->step_roughly from the residual r. */

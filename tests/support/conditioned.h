@@ -7,6 +7,7 @@
 #ifndef TESTS_CONDITIONED_H
 #define TESTS_CONDITIONED_H
 
+#include "core/alloc.h"
 #include "generated.h"
 
 #include <gmp.h>
@@ -168,9 +169,7 @@ static inline double big_condition(const big *L, const uz_csc *K, qp_random *rng
         size = big_norm(&z[d], z, d) / before;
     }
     big_free(z, d);
-    free(x);
-    free(y);
-    free(root);
+    uz_free_all(x, y, root);
     return most * size;
 }
 
@@ -478,9 +477,7 @@ static inline uz_qp conditioned_qp(uint64_t seed, bool ranged)
         qp.h[i] = fmax(-1e300, fmin(1e300, qp.h[i] * (apart                      ? random_range(&rng)
                                                       : random_chance(&rng, 0.7) ? force
                                                                                  : length)));
-    free(u);
-    free(K);
-    free(N);
+    uz_free_all(u, K, N);
     return qp;
 }
 

@@ -4,6 +4,7 @@
 #ifndef TESTS_CONTRADICTIONS_H
 #define TESTS_CONTRADICTIONS_H
 
+#include "core/alloc.h"
 #include "qp_fixture.h"
 #include "rational.h"
 
@@ -82,10 +83,7 @@ static inline uz_qp contradicting(qp_random *rng, double *margin)
     }
     qp.K = csc_from_dense(K, d, d, true);
     qp.N = csc_from_dense(N, m, d, false);
-    free(N);
-    free(G);
-    free(K);
-    free(inside);
+    uz_free_all(N, G, K, inside);
     return qp;
 }
 

@@ -3,6 +3,7 @@
 #ifndef TESTS_ELEMENT_BODIES_H
 #define TESTS_ELEMENT_BODIES_H
 
+#include "core/alloc.h"
 #include "element_mesh.h"
 
 /* A body on a mesh of the unit square or cube, before and after it takes its shape. */
@@ -28,10 +29,7 @@ static inline small_body body_of(uz_element element, int nx, int ny, int nz)
 static inline void body_free(small_body *b)
 {
     small_mesh_free(&b->mesh);
-    free(b->u);
-    free(b->f);
-    free(b->fixed);
-    free(b->loaded);
+    uz_free_all(b->u, b->f, b->fixed, b->loaded);
 }
 
 /* Holds component c where coordinate `axis` of the unit square or cube is `at`. */

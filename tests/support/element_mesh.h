@@ -3,6 +3,7 @@
 #ifndef TESTS_ELEMENT_MESH_H
 #define TESTS_ELEMENT_MESH_H
 
+#include "core/alloc.h"
 #include "element/element.h"
 #include "harness.h"
 #include "scene/mesh.h"
@@ -61,9 +62,7 @@ static inline void *zeros(size_t count, size_t size)
 
 static inline void small_mesh_free(small_mesh *mesh)
 {
-    free(mesh->xyz);
-    free(mesh->node);
-    free(mesh->middle);
+    uz_free_all(mesh->xyz, mesh->node, mesh->middle);
     *mesh = (small_mesh){0};
 }
 
@@ -234,9 +233,7 @@ static inline double *sky_row(const skyline *K, int i)
 
 static inline void skyline_free(skyline *K)
 {
-    free(K->first);
-    free(K->start);
-    free(K->value);
+    uz_free_all(K->first, K->start, K->value);
 }
 
 static inline skyline skyline_of(const small_mesh *mesh)

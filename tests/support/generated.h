@@ -6,6 +6,7 @@
 #ifndef TESTS_GENERATED_H
 #define TESTS_GENERATED_H
 
+#include "core/alloc.h"
 #include "judge.h"
 #include "qp_fixture.h"
 
@@ -115,11 +116,7 @@ static inline void generated_load(qp_random *rng, uz_qp *qp, bool *active)
     }
     memcpy(qp->p, Ku, (size_t)d * sizeof *Ku);
     uz_csc_gaxpy_t(qp->p, &qp->N, -1, r);
-    free(u);
-    free(Ku);
-    free(r);
-    free(Nu);
-    free(column);
+    uz_free_all(u, Ku, r, Nu, column);
 }
 
 /* The same problem for the same seed. active: room for GENERATED_MOST rows. */

@@ -7,6 +7,7 @@
 #ifndef TESTS_HEX8_H
 #define TESTS_HEX8_H
 
+#include "core/alloc.h"
 #include "uzawa.h"
 
 #include <math.h>
@@ -116,9 +117,7 @@ static inline uz_status hex8_stiffness(uz_csc *K, int64_t n, uz_error *err)
     for (int64_t c = 0; c < n * n * n; c++)
         hex8_add_cell(&t, ke, n, c % n, c / n % n, c / (n * n));
     uz_status status = uz_csc_from_triplets(K, d, d, t.count, t.row, t.col, t.value, err);
-    free(t.row);
-    free(t.col);
-    free(t.value);
+    uz_free_all(t.row, t.col, t.value);
     return status;
 }
 
@@ -143,9 +142,7 @@ static inline uz_status hex8_qp(uz_qp *qp, int64_t n, uz_error *err)
     uz_status status = uz_csc_from_triplets(&qp->N, m, d, m, row, col, value, err);
     if (status == UZ_OK)
         status = hex8_stiffness(&qp->K, n, err);
-    free(row);
-    free(col);
-    free(value);
+    uz_free_all(row, col, value);
     return status;
 }
 
@@ -170,9 +167,7 @@ static inline uz_status hex8_lean(uz_qp *qp, uz_error *err)
         uz_csc_clear(&qp->N);
         qp->N = N;
     }
-    free(row);
-    free(col);
-    free(value);
+    uz_free_all(row, col, value);
     return status;
 }
 

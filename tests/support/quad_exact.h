@@ -7,6 +7,7 @@
 #ifndef TESTS_QUAD_EXACT_H
 #define TESTS_QUAD_EXACT_H
 
+#include "core/alloc.h"
 #include "uzawa.h"
 
 #include <stdlib.h>
@@ -110,15 +111,7 @@ typedef struct {
 
 static inline void quad_exact_free(quad_exact *x)
 {
-    free(x->first);
-    free(x->L);
-    free(x->Z);
-    free(x->D);
-    free(x->g0);
-    free(x->u);
-    free(x->r);
-    free(x->g);
-    free(x->active);
+    uz_free_all(x->first, x->L, x->Z, x->D, x->g0, x->u, x->r, x->g, x->active);
     memset(x, 0, sizeof *x);
 }
 

@@ -146,10 +146,7 @@ static inline double *solve_linear(const uz_body_model *model, const uz_scene *s
     CHECK(dense_cholesky(L, model->d));
     dense_solve(p, L, model->d);
     uz_recover_nodal(nodal, model, p, fixed);
-    free(p);
-    free(h);
-    free(fixed);
-    free(L);
+    uz_free_all(p, h, fixed, L);
     return nodal;
 }
 

@@ -7,6 +7,7 @@
 #define TESTS_THEORY_H
 
 #include "body_fixture.h"
+#include "core/alloc.h"
 
 typedef struct {
     char name[80], quantity[24];
@@ -292,11 +293,7 @@ static inline void theory_join(uz_scene *to, const char *own, uz_scene *from, co
     a->n_groups = n_groups;
     a->n_nodes += b->n_nodes;
     a->n_elements += b->n_elements;
-    free(b->xyz);
-    free(b->kind);
-    free(b->first);
-    free(b->node);
-    free(b->groups);
+    uz_free_all(b->xyz, b->kind, b->first, b->node, b->groups);
     *b = (uz_given_mesh){.dim = a->dim};
     uz_scene_clear(from);
 }

@@ -2,6 +2,7 @@
 #include "store/objects/objects.h"
 #include "base/clock.h"
 #include "base/given_file.h"
+#include "core/alloc.h"
 
 #include <curl/curl.h>
 #include <errno.h>
@@ -410,10 +411,7 @@ void objects_close(objects *o)
         curl_global_cleanup();
     if (o->secret)
         explicit_bzero(o->secret, strlen(o->secret));
-    free(o->url);
-    free(o->region);
-    free(o->user);
-    free(o->secret);
+    uz_free_all(o->url, o->region, o->user, o->secret);
     pthread_mutex_destroy(&o->lock);
     free(o);
 }

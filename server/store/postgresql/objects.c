@@ -1,6 +1,7 @@
 /* objects.c: bytes in an object store: bodies of requests; results, packed into objects of a few MiB, of which readers
  * get the ranges that they want; what belongs to nobody is removed. */
 #include "store/postgresql/objects.h"
+#include "core/alloc.h"
 
 #include <gnutls/crypto.h>
 #include <math.h>
@@ -176,10 +177,7 @@ void postgresql_placed_free(placed_result *r)
 {
     if (!r)
         return;
-    free(r->pieces);
-    free(r->objects);
-    free(r->contents);
-    free(r);
+    uz_free_all(r->pieces, r->objects, r->contents, r);
 }
 
 /* The text of an array of the numbers, or words, of some pieces. */

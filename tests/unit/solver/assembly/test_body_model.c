@@ -1,5 +1,6 @@
 /* The split that the factor cache needs: a body built once, loads put on it, the key that says when they fit. */
 #include "assembly/assembly.h"
+#include "core/alloc.h"
 #include "harness.h"
 #include "scene_fixture.h"
 
@@ -26,10 +27,7 @@ TEST(load_on_a_kept_body_equals_a_new_body)
     CHECK(nodal[0] == 0.01 && nodal[1] == 0 && nodal[2] == p[0] && nodal[12] == 0.01 && nodal[14] == p[10]);
     uz_recover_nodal(nodal, &model, p, NULL);
     CHECK(nodal[0] == 0);
-    free(p);
-    free(h);
-    free(fixed);
-    free(nodal);
+    uz_free_all(p, h, fixed, nodal);
     uz_qp_clear(&qp);
     uz_body_model_clear(&model);
     uz_scene_clear(&first);

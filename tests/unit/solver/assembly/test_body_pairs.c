@@ -1,5 +1,6 @@
 /* Contact between two parts of one mesh. */
 #include "body_fixture.h"
+#include "core/alloc.h"
 #include "internal_forces.h"
 
 /* Adds a box, its groups called "a left", ...; its nodes moved. */
@@ -38,11 +39,7 @@ static void add_box(uz_scene *s, const uz_box *box, char name, body_map map)
     }
     to->n_groups += from->n_groups;
     from->n_groups = 0; /* their lists have moved */
-    free(to->groups);
-    free(to->xyz);
-    free(to->kind);
-    free(to->first);
-    free(to->node);
+    uz_free_all(to->groups, to->xyz, to->kind, to->first, to->node);
     to->groups = groups;
     to->xyz = xyz;
     to->kind = kind;

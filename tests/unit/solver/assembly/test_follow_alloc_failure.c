@@ -1,5 +1,6 @@
 /* A body with a tie and a rigid group: its rigid motions are among its dofs and have no force, and each
  * allocation on the way fails once. Linked with malloc, calloc, realloc and free wrapped. */
+#include "core/alloc.h"
 #include "failing_heap.h"
 
 #include "sanitized.h"
@@ -78,11 +79,7 @@ TEST(rigid_motions_have_no_force)
     uz_csc_gaxpy(p, &model.K_fixed, 1, given);
     for (int64_t j = 0; j < model.d; j++)
         CHECK(fabs(p[j]) < 1e-13);
-    free(nodal);
-    free(back);
-    free(u);
-    free(p);
-    free(given);
+    uz_free_all(nodal, back, u, p, given);
     uz_body_model_clear(&model);
     uz_scene_clear(&s);
 }

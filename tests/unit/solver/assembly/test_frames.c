@@ -1,5 +1,6 @@
 /* Dofs of contact nodes turned into normal and tangents: the same problem as in x and y. */
 #include "assembly/parts.h"
+#include "core/alloc.h"
 #include "scene_fixture.h"
 
 #include <float.h>
@@ -109,9 +110,7 @@ TEST(answers_are_those_of_dofs_along_the_axes)
     uz_problem_clear(&plain);
     uz_body_model_clear(&model);
     uz_problem_clear(&scene);
-    free(p);
-    free(fixed);
-    free(nodal);
+    uz_free_all(p, fixed, nodal);
 }
 
 /* K = Q K0 Q', where K0 is that of the scene without its contacts. */
@@ -142,9 +141,7 @@ TEST(stiffness_is_rotated)
         free(e);
         free(column);
     }
-    free(K);
-    free(K0);
-    free(x);
+    uz_free_all(K, K0, x);
     uz_body_model_clear(&model);
     uz_body_model_clear(&plain);
     uz_scene_clear(&scene);
@@ -224,10 +221,7 @@ TEST(recovering_and_restricting_are_inverse)
     double *Nu = zeros(model.m);
     uz_csc_gaxpy(Nu, &model.N, 1, u);
     CHECK(fabs(Nu[4] + 0.28 * nodal[2 * node] + 0.96 * nodal[2 * node + 1]) < 4 * DBL_EPSILON);
-    free(Nu);
-    free(u);
-    free(back);
-    free(nodal);
+    uz_free_all(Nu, u, back, nodal);
     uz_body_model_clear(&model);
     uz_scene_clear(&scene);
 }
@@ -370,9 +364,6 @@ TEST(frames_in_space)
                 CHECK(!uz_node_frame(&model, a));
         }
         check_rotated_element(&model);
-        free(model.sites);
-        free(model.frame_of);
-        free(model.info.rotated_node);
-        free(model.info.frame);
+        uz_free_all(model.sites, model.frame_of, model.info.rotated_node, model.info.frame);
     }
 }

@@ -1,6 +1,7 @@
 /* Bodies with hanging nodes: patch tests, and K, p and N as T'K T, T'f and N T of all nodes. */
 #include "assembly/discretization.h"
 #include "body_fixture.h"
+#include "core/alloc.h"
 #include "linalg/linalg.h"
 #include "scene/subdivide.h"
 
@@ -90,12 +91,7 @@ static void check_patch(uz_model model, const char *element, bool quadratic)
             inside++;
         }
     CHECK_MSG(hanging > 5 && inside > 10, "%s: %lld hang, %lld inside", element, (long long)hanging, (long long)inside);
-    free(nodal);
-    free(u);
-    free(f);
-    free(fixed);
-    free(again);
-    free(boundary);
+    uz_free_all(nodal, u, f, fixed, again, boundary);
     uz_body_model_clear(&body);
     uz_scene_clear(&s);
 }
@@ -154,9 +150,7 @@ static void check_areas(const uz_body_model *body, const char *kind)
     for (int64_t i = 0; i < body->m && !inner; i++)
         CHECK_MSG(fabs(at[i] - weight[body->info.contact_node[i]]) < 1e-12, "%s, row %lld: %g, not %g", kind,
                   (long long)i, at[i], weight[body->info.contact_node[i]]);
-    free(r);
-    free(at);
-    free(weight);
+    uz_free_all(r, at, weight);
 }
 
 /* Supports along and across the axes, springs, and a round obstacle that turns nodes, at sides with hanging nodes. */

@@ -3,6 +3,7 @@
 #include "assembly/assembly.h"
 #include "assembly/thin_elements.h"
 #include "body_fixture.h"
+#include "core/alloc.h"
 #include "element/strain_lanes.h"
 #include "element_mesh.h"
 #include "post/parts.h"
@@ -388,9 +389,7 @@ static double plain_estimate(double *share, const uz_body_model *model, const uz
         look_at(&s, &x, e, ENERGY);
         add_energies(&x, &s, e);
     }
-    free(x.least);
-    free(x.average);
-    free(free_strain);
+    uz_free_all(x.least, x.average, free_strain);
     *share = sqrt(x.stress2 / x.whole2);
     return sqrt(x.eta2 / (x.stress2 + x.eta2));
 }
@@ -438,11 +437,7 @@ static void compare_stresses(const uz_body_model *model, const uz_scene *scene, 
                           what, (int)e, c, got, s.stress[g][c]);
             }
     }
-    free(stress);
-    free(point);
-    free(element);
-    free(free_strain);
-    free(u);
+    uz_free_all(stress, point, element, free_strain, u);
     uz_field_body_clear(&body);
 }
 

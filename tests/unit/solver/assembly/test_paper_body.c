@@ -1,5 +1,6 @@
 /* The example of the paper, and the error estimate. */
 #include "assembly/assembly.h"
+#include "core/alloc.h"
 #include "harness.h"
 #include "scene_fixture.h"
 
@@ -70,9 +71,7 @@ static reference solve_contact(const uz_qp *qp)
     }
     out.lambda_max = largest_eigenvalue(D, m);
     out.u = u;
-    free(L);
-    free(D);
-    free(Ku);
+    uz_free_all(L, D, Ku);
     return out;
 }
 
@@ -116,10 +115,7 @@ static double estimate_paper_body(int64_t nx, int64_t ny)
     double *nodal = zeros(model.mesh.n_nodes * 2);
     uz_recover_nodal(nodal, &model, ref.u, NULL);
     const double estimate = uz_estimate_mesh_error(NULL, NULL, &model, NULL, nodal);
-    free(nodal);
-    free(ref.u);
-    free(qp.p);
-    free(qp.h);
+    uz_free_all(nodal, ref.u, qp.p, qp.h);
     uz_body_model_clear(&model);
     uz_scene_clear(&scene);
     return estimate;

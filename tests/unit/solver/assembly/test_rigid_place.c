@@ -2,6 +2,7 @@
  * first and second order, by differences. */
 #include "assembly/parts.h"
 #include "body_fixture.h"
+#include "core/alloc.h"
 #include "core/vector3.h"
 #include "linalg/blas.h"
 #include "linalg/linalg.h"
@@ -125,11 +126,7 @@ TEST(steps_are_rigid_and_of_second_order_what_is_told)
                 }
         }
         CHECK(size > 0.2);
-        free(from);
-        free(u);
-        free(f);
-        free(v);
-        free(p);
+        uz_free_all(from, u, f, v, p);
         uz_body_model_clear(&model);
         uz_scene_clear(&s);
     }

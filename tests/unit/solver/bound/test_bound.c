@@ -1,6 +1,7 @@
 /* The guaranteed bound on the whole error: its elements, what it proves, and what it refuses. */
 #include "bound/bound.h"
 #include "bound_shapes.h"
+#include "core/alloc.h"
 #include "linalg/blas.h"
 #include "sanitized.h"
 #include "scene_fixture.h"
@@ -565,10 +566,7 @@ TEST(what_only_obstacles_hold)
             uz_bound_check_clear(&good);
             uz_bound_check_clear(&off);
         }
-        free(press);
-        free(stress);
-        free(u);
-        free(dof);
+        uz_free_all(press, stress, u, dof);
         uz_result_free(v);
         uz_qp_clear(&qp);
         uz_result_free(result);
@@ -614,10 +612,7 @@ TEST(what_leaves_the_obstacle_keeps_to_the_supports)
     CHECK_REL(moved.lift, alone.norm, 1e-6);
     uz_bound_check_clear(&moved);
     uz_bound_check_clear(&alone);
-    free(stress);
-    free(bump);
-    free(u);
-    free(dof);
+    uz_free_all(stress, bump, u, dof);
     uz_qp_clear(&qp);
     uz_result_free(result);
     uz_bound_body_clear(&body);

@@ -1,6 +1,7 @@
 /* Guaranteed intervals of quantities: what any pair of displacement and stress proves of them. */
 #include "bound/interval.h"
 #include "bound_scenes.h"
+#include "core/alloc.h"
 #include "linalg/blas.h"
 #include "run/guarantee.h"
 #include "sanitized.h"
@@ -271,9 +272,7 @@ TEST(pairs_are_trusted_in_nothing)
             free(interval.residual);
             free(interval.local);
         }
-        free(w);
-        free(v);
-        free(stress);
+        uz_free_all(w, v, stress);
         close_lab(&l);
         uz_result_free(reference);
         uz_scene_clear(&fine);
@@ -322,9 +321,7 @@ TEST(what_is_kept_of_elements_changes_nothing)
             free(dof[0]);
             free(dof[1]);
         }
-        free(v);
-        free(own);
-        free(kept);
+        uz_free_all(v, own, kept);
         close_lab(&l);
     }
 }

@@ -3,6 +3,7 @@
 #include "certificate/certificate.h"
 #include "certificate/distrust.h"
 #include "certificate/row_settle.h"
+#include "core/alloc.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "quad_exact.h"
@@ -111,9 +112,7 @@ static void free_bench(bench *b)
     quad_exact_free(&b->exact);
     free_inverse(&b->inv);
     uz_qp_clear(&b->qp);
-    free(b->u);
-    free(b->r);
-    free(b->g);
+    uz_free_all(b->u, b->r, b->g);
 }
 
 static uz_certify_input input_of(bench *b)
@@ -317,9 +316,7 @@ static uz_qp build_backwards(qp_random *rng, int64_t d, int64_t m, bool *active)
     memset(qp.p, 0, (size_t)d * sizeof *qp.p);
     uz_csc_symv(qp.p, &qp.K, 1, u);
     uz_csc_gaxpy_t(qp.p, &qp.N, -1, r);
-    free(u);
-    free(r);
-    free(Nu);
+    uz_free_all(u, r, Nu);
     return qp;
 }
 
@@ -596,9 +593,7 @@ TEST(doubt_is_measured_where_it_matters_to_what_was_asked)
         CHECK_INT(b.inv.measured, cases[k].measured);
         CHECK_REL(c.relative_error, cases[k].measured ? 1e-6 : 1e-6 / sqrt(1 - cases[k].doubt), 1e-2);
         free_inverse(&b.inv);
-        free(b.u);
-        free(b.r);
-        free(b.g);
+        uz_free_all(b.u, b.r, b.g);
     }
     uz_qp_clear(&qp);
 }

@@ -1,4 +1,5 @@
 /* The dense operator from a factor with the contact last and from one with the contact anywhere: the same numbers. */
+#include "core/alloc.h"
 #include "dual/dual.h"
 #include "dual/form.h"
 #include "factor_fixture.h"
@@ -25,9 +26,7 @@ static void repeat_rows(uz_qp *qp)
     CHECK(uz_csc_from_triplets(&qp->N, 2 * m, qp->K.cols, 2 * nnz, row, col, value, &err) == UZ_OK);
     free(qp->h);
     qp->h = h;
-    free(row);
-    free(col);
-    free(value);
+    uz_free_all(row, col, value);
 }
 
 static uz_qp leaning_cube(int64_t n)
@@ -115,13 +114,7 @@ static void compare(const uz_qp *qp)
     }
     free_form(&last);
     free_form(&any);
-    free(r);
-    free(Dr);
-    free(other);
-    free(g);
-    free(u);
-    free(v);
-    free(close);
+    uz_free_all(r, Dr, other, g, u, v, close);
 }
 
 TEST(contact_last_and_contact_anywhere)

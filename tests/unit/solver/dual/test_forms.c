@@ -1,4 +1,5 @@
 /* Every form of the table through the same checks: they are forms of one operator. A new row is tested at once. */
+#include "core/alloc.h"
 #include "dual/block.h"
 #include "dual/form.h"
 #include "factor_fixture.h"
@@ -118,11 +119,7 @@ static void check_operator(subject *s, subject *first, const double *x, const do
               uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op));
     CHECK_INT(uz_dual_load_apply(s->load, other, x, &err), UZ_OK); /* by what was prepared */
     check_close(s, other, Dx, m, "D x after preparing");
-    free(Dx);
-    free(Dy);
-    free(other);
-    free(column);
-    free(unit);
+    uz_free_all(Dx, Dy, other, column, unit);
 }
 
 /* u(r), its energies, and a feasible displacement within the bound. */
@@ -158,12 +155,7 @@ static void check_recovery(subject *s, const double *r)
     for (int64_t i = 0; i < m; i++)
         CHECK_MSG(g[i] >= -1e-9 && (!close[i] || g[i] <= 1e-9), "%s: gap %g of row %d",
                   uz_choice_name(UZ_CHOICE_OPERATOR, s->can->op), g[i], (int)i);
-    free(Dr);
-    free(g);
-    free(u);
-    free(v);
-    free(K);
-    free(close);
+    uz_free_all(Dr, g, u, v, K, close);
 }
 
 /* D_AA r_A = g0_A and r = 0 elsewhere; bounds: each row bounds a dof, so that nobody may refuse. every: 0, A is a
@@ -202,12 +194,7 @@ static void check_active(subject *s, bool bounds, int64_t every)
         CHECK_INT(uz_dual_load_recover(s->load, u, r, false, &err), UZ_OK);
         check_equilibrium(s, u, r, "with given rows");
     }
-    free(r);
-    free(g);
-    free(Dr);
-    free(gap);
-    free(u);
-    free(active);
+    uz_free_all(r, g, Dr, gap, u, active);
 }
 
 /* Where somebody has no factor to ask. */
@@ -291,9 +278,7 @@ static void check_forms(const uz_qp *qp, bool bounds)
         close_subject(&s);
     }
     close_subject(&first);
-    free(x);
-    free(y);
-    free(r);
+    uz_free_all(x, y, r);
 }
 
 /* What is small enough is told by a cycle, and not made sharp; what is not is sharp, to be judged by. */

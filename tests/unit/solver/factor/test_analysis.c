@@ -1,4 +1,5 @@
 /* One analysis for many factors of one pattern: the same bits as an analysis of their own, in any number of threads. */
+#include "core/alloc.h"
 #include "factor_fixture.h"
 #include "floor.h"
 #include "harness.h"
@@ -50,9 +51,7 @@ TEST(shared_analysis_gives_the_same_bits)
         uz_factor_free(fresh);
         uz_qp_clear(&first);
         uz_qp_clear(&second);
-        free(dofs);
-        free(x);
-        free(y);
+        uz_free_all(dofs, x, y);
     }
 }
 
@@ -252,9 +251,6 @@ TEST(numbering_of_dofs)
         uz_factor_free(other);
         uz_csc_clear(&A);
         uz_qp_clear(&qp);
-        free(to);
-        free(b);
-        free(x);
-        free(y);
+        uz_free_all(to, b, x, y);
     }
 }

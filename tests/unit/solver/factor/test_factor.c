@@ -1,4 +1,5 @@
 /* The sparse factor: what it refuses, what its last block is, and what its orderings leave behind. */
+#include "core/alloc.h"
 #include "factor/factor_private.h"
 #include "factor_fixture.h"
 #include "harness.h"
@@ -169,9 +170,7 @@ TEST(solves_are_accurate)
         uz_factor_workspace_free(ws);
         uz_factor_free(factor);
         uz_csc_clear(&K);
-        free(b);
-        free(x);
-        free(y);
+        uz_free_all(b, x, y);
     }
 }
 
@@ -223,10 +222,7 @@ static void check_block(const uz_factor *factor, const double *S, const int64_t 
             CHECK_MSG(fabs(sum - S[rank[k] * n_last + rank[l]]) < 1e-13, "%s: S(%d, %d) is %g, want %g", what, (int)k,
                       (int)l, sum, S[rank[k] * n_last + rank[l]]);
         }
-    free(block);
-    free(order);
-    free(where);
-    free(rank);
+    uz_free_all(block, order, where, rank);
 }
 
 static void check_last(const double *dense, int64_t n, const int64_t *last, int64_t n_last, const char *what)
@@ -397,9 +393,7 @@ TEST(principal_part)
         uz_factor_workspace_free(ws);
         uz_csc_clear(&K);
         uz_csc_clear(&held);
-        free(fixed);
-        free(b);
-        free(x);
+        uz_free_all(fixed, b, x);
     }
 }
 
@@ -440,9 +434,7 @@ TEST(principal_parts_one_after_the_other)
         uz_factor_free(factor);
         uz_factor_workspace_free(ws);
         uz_csc_clear(&K);
-        free(fixed);
-        free(b);
-        free(x);
+        uz_free_all(fixed, b, x);
     }
 }
 
@@ -506,10 +498,7 @@ TEST(factors_made_briefly_have_their_own_numbers)
     uz_factor_free(factor);
     uz_factor_workspace_free(ws);
     uz_csc_clear(&K);
-    free(b);
-    free(x);
-    free(want);
-    free(room);
+    uz_free_all(b, x, want, room);
 }
 
 TEST(inverse_norm_is_an_upper_bound)
@@ -552,9 +541,7 @@ TEST(inverse_norm_is_an_upper_bound)
         CHECK_MSG(rcond <= 1e3 / worst, "n %d: %g, of %g", (int)n, rcond, 1 / worst);
         uz_factor_free(brief);
         uz_analysis_free(analysis);
-        free(dense);
-        free(x);
-        free(L);
+        uz_free_all(dense, x, L);
         uz_factor_free(factor);
         uz_csc_clear(&K);
     }

@@ -1,4 +1,5 @@
 /* What two threads make of a factor: shares that don't need each other, and the same bits as by one thread. */
+#include "core/alloc.h"
 #include "core/aside.h"
 #include "factor/factor_private.h"
 #include "factor_fixture.h"
@@ -174,9 +175,7 @@ TEST(large_supernodes_are_made_together)
     uz_factor_free(factor);
     check_same_bits(&K, SANITIZED ? 1 : 3, !SANITIZED);
     uz_csc_clear(&K);
-    free(x);
-    free(f);
-    free(room);
+    uz_free_all(x, f, room);
 }
 
 /* By the shares as by one supernode after the other, but for the order of sums. */
@@ -207,7 +206,5 @@ TEST(substitutions_by_shares)
     uz_aside_allow(1);
     uz_factor_free(factor);
     uz_qp_clear(&qp);
-    free(X);
-    free(Y);
-    free(room);
+    uz_free_all(X, Y, room);
 }

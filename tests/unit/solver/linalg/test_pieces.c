@@ -1,4 +1,5 @@
 /* Loops that threads share meet everything once, in an order that does not depend on how many there are. */
+#include "core/alloc.h"
 #include "core/aside.h"
 #include "harness.h"
 #include "linalg/pieces.h"
@@ -61,9 +62,5 @@ TEST(columns_that_threads_share_meet_rows_in_one_order)
             CHECK_INT(runs[j], threads);
     }
     uz_aside_allow(1);
-    free(met[0]);
-    free(met[1]);
-    free(runs);
-    free(A.ptr);
-    free(A.idx);
+    uz_free_all(met[0], met[1], runs, A.ptr, A.idx);
 }

@@ -1,4 +1,5 @@
 /* Rows that depend on each other: exchanges, proofs of contradiction, and refinement by the original data. */
+#include "core/alloc.h"
 #include "linalg/blas.h"
 #include "harness.h"
 #include "judge.h"
@@ -295,12 +296,7 @@ TEST(panels_do_what_whole_kernels_do)
         uz_potrs_lower(n, L, n, room);
         for (int64_t i = 0; i < n; i++)
             CHECK(fabs(x[i] - room[i]) < 1e-12);
-        free(A);
-        free(L);
-        free(M);
-        free(room);
-        free(x);
-        free(again);
+        uz_free_all(A, L, M, room, x, again);
     }
 }
 
@@ -327,9 +323,7 @@ TEST(pivoted_factor_finds_the_rank)
                 CHECK(fabs(sum) < 1e-11);
                 CHECK(i == j || L[j + j * n] >= fabs(L[i + j * n]));
             }
-        free(Z);
-        free(A);
-        free(L);
+        uz_free_all(Z, A, L);
     }
 }
 

@@ -1,4 +1,5 @@
 /* The paper's body against numbers of an independent program: mm, N, MPa. */
+#include "core/alloc.h"
 #include "factor_fixture.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -186,10 +187,7 @@ static step_count plain_algorithm_2(const double *D, const double *g0, int64_t m
         count.restarts += ascent < 0;
         change = sqrt(square);
     }
-    free(r);
-    free(rho);
-    free(next);
-    free(gap);
+    uz_free_all(r, rho, next, gap);
     return count;
 }
 
@@ -267,9 +265,7 @@ TEST(steps_are_those_of_the_rows_as_given)
             }
             uz_result_free(result);
         }
-        free(D);
-        free(u);
-        free(g0);
+        uz_free_all(D, u, g0);
         free_probe(&p);
     }
 }
@@ -370,9 +366,7 @@ static double distance(const probe *p, const double *r, const double *s)
     probe_solve(p, x);
     for (int64_t j = 0; j < d; j++)
         sum += force[j] * x[j];
-    free(difference);
-    free(force);
-    free(x);
+    uz_free_all(difference, force, x);
     return sqrt(fmax(0, sum));
 }
 

@@ -1,5 +1,6 @@
 /* What is decided by counts alone. */
 #include "body_fixture.h"
+#include "core/alloc.h"
 #include "harness.h"
 #include "run/cost.h"
 #include "scene/breadth.h"
@@ -243,10 +244,7 @@ TEST(a_large_K_has_its_own_rate)
         CHECK(wide == WIDE ? of.entry_s > 1e-11 && of.entry_s < 1e-6 : of.entry_s == 0.0);
         CHECK(wide == WIDE ? of.cycle_s > 1e-11 && of.cycle_s < 1e-6 : of.cycle_s == 0.0);
     }
-    free(K.ptr);
-    free(K.idx);
-    free(K.val);
-    free(none.ptr);
+    uz_free_all(K.ptr, K.idx, K.val, none.ptr);
 }
 
 /* Rates are of the kernels themselves: a sweep reads four bytes an entry and a step some forty a dof, neither faster

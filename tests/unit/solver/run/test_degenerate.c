@@ -1,5 +1,6 @@
 /* Rows that depend on each other, meet in one point or form long chains: such answers have bounds, and true ones.
  * `make extremes` runs many more. */
+#include "core/alloc.h"
 #include "degenerate.h"
 #include "harness.h"
 
@@ -92,10 +93,7 @@ TEST(a_long_chain_is_certified)
     }
     uz_result_free(result);
     uz_problem_clear(&problem);
-    free(exact);
-    free(row);
-    free(column);
-    free(value);
+    uz_free_all(exact, row, column, value);
 }
 
 /* u_i - u_(i+1) <= h_i around a circle, with h that add up to nothing: each row holds as an equation, and u, whose mean
@@ -136,10 +134,7 @@ static void solve_cycle(int64_t n)
     }
     uz_result_free(result);
     uz_problem_clear(&problem);
-    free(row);
-    free(column);
-    free(value);
-    free(exact);
+    uz_free_all(row, column, value, exact);
 }
 
 /* Dense on the contact, and with a sparse factor of all that touch. */
@@ -185,7 +180,5 @@ TEST(convex_regression_takes_few_steps)
     }
     uz_result_free(result);
     uz_problem_clear(&problem);
-    free(row);
-    free(column);
-    free(value);
+    uz_free_all(row, column, value);
 }

@@ -1,4 +1,5 @@
 /* What a scene on a mesh with groups is refused for: materials, supports, loads, contacts, model. */
+#include "core/alloc.h"
 #include "core/aside.h"
 #include "harness.h"
 #include "scene/mesh.h"
@@ -230,8 +231,5 @@ TEST(threads_find_the_first_element_that_is_wrong)
         CHECK_MSG(strstr(err.message, "element 20003 "), "%s", err.message);
     }
     uz_aside_allow(1);
-    free(xyz);
-    free(kind);
-    free(first);
-    free(node);
+    uz_free_all(xyz, kind, first, node);
 }

@@ -1,6 +1,7 @@
 /* Parts of a scene together: elements, models, materials, supports, loads, obstacles, two bodies. Every answer called
  * converged is held against what does not come from the solver: the exact solution of its matrices, geometry,
  * equilibrium, virtual work, and the same scene turned, in other units, with its nodes in another order. */
+#include "core/alloc.h"
 #include "harness.h"
 #include "internal_forces.h"
 
@@ -295,9 +296,7 @@ static void check_work(examined *e)
     HOLDS(e,
           fabs(twice - work - supports) <= 4 * c->absolute_error * c->energy_norm + over + 1e-9 * (size + fabs(twice)),
           "work %g and %g of supports, twice the strain energy %g", work, supports, twice);
-    free(left);
-    free(free_left);
-    free(u);
+    uz_free_all(left, free_left, u);
 }
 
 /* ------------------------------------------------------------------ one scene */
@@ -360,9 +359,7 @@ static void examine(random_scene *s, const uz_result *x, tally *t, uint64_t seed
     find_forces(&e);
     check_equilibrium(&e);
     check_work(&e);
-    free(e.load);
-    free(e.inner);
-    free(e.contact);
+    uz_free_all(e.load, e.inner, e.contact);
     uz_body_model_clear(&e.model);
 }
 
@@ -402,9 +399,7 @@ static void compare(random_scene *s, const uz_result *x, const uz_result *y, con
     const double sum[2] = {x->summary.reaction_sum, y->summary.reaction_sum / how->force};
     if (fmax(cx->relative_error, cy->relative_error) <= 1e-8)
         HOLDS(&e, fabs(sum[0] - sum[1]) <= 1e-4 * (fabs(sum[0]) + 1e-3), "reactions sum to %g, but %g", sum[0], sum[1]);
-    free(d);
-    free(f);
-    free(ku);
+    uz_free_all(d, f, ku);
     uz_body_model_clear(&e.model);
 }
 
