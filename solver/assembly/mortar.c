@@ -44,12 +44,6 @@
 /* So has the area of a place: of a quadratic edge that ends on the axis of revolution the end has none. */
 #define LEAST_AREA 1e-9
 
-int uz_mortar_by_number(const void *a, const void *b)
-{
-    const int64_t *x = a, *y = b;
-    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
-}
-
 /* ---- surfaces */
 
 const uz_mortar_geometry *uz_mortar_geometry_of(int dim)

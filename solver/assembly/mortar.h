@@ -122,9 +122,6 @@ bool uz_mortar_describe(uz_contact_surface *out, const uz_mortar_surface *surfac
 /* Cosine of the feature angle: sides that turn by more make a corner. */
 double uz_mortar_least_cosine(const uz_contact_input *in);
 
-/* Pairs of numbers by the first, then by the second, for qsort. */
-int uz_mortar_by_number(const void *a, const void *b);
-
 #define UZ_OF_SURFACES "contact between two surfaces" /* what there may be no memory for */
 
 #endif

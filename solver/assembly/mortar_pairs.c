@@ -496,7 +496,7 @@ static bool rank_zones(uz_contact_sites *sites, const bool *bound, uz_mortar_pai
         sites->rank[2 * sites->n_ranks++ + 1] = hi ? s[first].lo : s[first].hi;
     }
     if (sites->rank)
-        qsort(sites->rank, (size_t)sites->n_ranks, 2 * sizeof *sites->rank, uz_mortar_by_number);
+        qsort(sites->rank, (size_t)sites->n_ranks, 2 * sizeof *sites->rank, uz_ascending_pairs);
     free(s);
     return sites->rank != NULL;
 }
@@ -507,10 +507,10 @@ bool uz_mortar_is_slave(const uz_contact_sites *sites, int64_t i, int64_t j)
     if (way[0] == way[1])
         return i < j;
     const size_t n = (size_t)sites->n_ranks, size = 2 * sizeof *sites->rank;
-    if (bsearch(way, sites->rank, n, size, uz_mortar_by_number))
+    if (bsearch(way, sites->rank, n, size, uz_ascending_pairs))
         return true;
     return way[0] < way[1] &&
-           !bsearch(back, sites->rank, n, size, uz_mortar_by_number); /* two that did not face each other before */
+           !bsearch(back, sites->rank, n, size, uz_ascending_pairs); /* two that did not face each other before */
 }
 
 /* ---- zones that face themselves */
@@ -607,8 +607,8 @@ static bool divide_zones(int64_t *zone, int64_t *n_zones, uz_mortar_pair *pair)
         queue = uz_alloc(surface->n, sizeof *queue);
         second = uz_alloc_zero(*n_zones, sizeof *second);
         good = half && queue && second;
-        qsort(across.pair, (size_t)across.n, sizeof *across.pair, uz_mortar_by_number);
-        qsort(sides.pair, (size_t)sides.n, sizeof *sides.pair, uz_mortar_by_number);
+        qsort(across.pair, (size_t)across.n, sizeof *across.pair, uz_ascending_pairs);
+        qsort(sides.pair, (size_t)sides.n, sizeof *sides.pair, uz_ascending_pairs);
     }
     if (good && across.n > 0)
         divide(half, surface, &across, &sides, queue);

@@ -176,7 +176,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
                 key[n][0] = surface->side[i].node[a];
                 key[n++][1] = 3 * i + a;
             }
-    qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
+    qsort(key, (size_t)n, sizeof *key, uz_ascending_pairs);
     for (int64_t p = 0; p < n; p++) {
         uz_mortar_side *e = &surface->side[key[p][1] / 3];
         const int a = (int)(key[p][1] % 3);

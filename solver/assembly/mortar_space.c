@@ -12,6 +12,7 @@
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
+#include "core/order.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
 
@@ -73,7 +74,7 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
         key[p][1] = p;
     }
     if (room)
-        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
+        qsort(key, (size_t)n, sizeof *key, uz_ascending_pairs);
     for (int64_t first = 0, end; first < n && room; first = end) {
         for (end = first; end < n && key[end][0] == key[first][0]; end++) {
             memcpy(xyz + 3 * (end - first), mesh->xyz + 3 * surface->node[key[end][1]], 3 * sizeof *xyz);
@@ -268,7 +269,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
             key[n++][1] = UZ_FACE_NODES * i + a;
         }
     if (room)
-        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_number);
+        qsort(key, (size_t)n, sizeof *key, uz_ascending_pairs);
     int64_t first = 0;
     for (int64_t k = 0; k < n; k++) {
         uz_mortar_side *side = &surface->side[key[k][1] / UZ_FACE_NODES];

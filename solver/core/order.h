@@ -23,6 +23,13 @@ static inline int uz_ascending_real(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Of pairs: by the first number, then by the second. */
+static inline int uz_ascending_pairs(const void *a, const void *b)
+{
+    const int64_t *x = a, *y = b;
+    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
+}
+
 /* A list that is short or nearly in order, as a rule. */
 static inline void uz_sort_32(int32_t *value, int64_t count)
 {
@@ -50,5 +57,13 @@ static inline int64_t uz_sort_unique(int64_t *value, int64_t count)
             value[kept++] = value[i];
     return kept;
 }
+
+/* The indices of n numbers in ascending order of these, of equal ones as they stand. Free with free(); NULL: no
+ * memory. */
+int64_t *uz_order_of(const int64_t *number, int64_t n);
+
+/* The first place in that order whose number is not less than `least`; n: there is none. order NULL: the numbers ascend
+ * as they stand. */
+int64_t uz_order_seek(const int64_t *number, const int64_t *order, int64_t n, int64_t least);
 
 #endif

@@ -5,6 +5,7 @@
 #include "io/abaqus.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "io/mesh_reader.h"
 #include "scene/given.h"
 
@@ -92,50 +93,27 @@ uz_status abaqus_no_memory(const abaqus_text *text)
     return abaqus_fail(text, UZ_ERR_MEMORY, "no memory for the mesh");
 }
 
-typedef struct {
-    int64_t tag, index;
-} tagged;
-
-static int compare_tagged(const void *a, const void *b)
-{
-    const tagged *x = a, *y = b;
-    return x->tag != y->tag ? (x->tag > y->tag) - (x->tag < y->tag) : (x->index > y->index) - (x->index < y->index);
-}
-
 uz_status abaqus_tags_sort(abaqus_tags *tags, const char *what, const abaqus_text *text)
 {
-    tags->ascending = true;
+    bool ascending = true;
     for (int64_t i = 1; i < tags->count; i++)
-        tags->ascending = tags->ascending && tags->tag[i - 1] < tags->tag[i];
-    if (tags->ascending)
+        ascending = ascending && tags->tag[i - 1] < tags->tag[i];
+    if (ascending)
         return UZ_OK;
-    tagged *list = uz_alloc(tags->count, sizeof *list);
-    tags->by_tag = uz_alloc(tags->count, sizeof *tags->by_tag);
-    uz_status status = list && tags->by_tag ? UZ_OK : abaqus_no_memory(text);
-    for (int64_t i = 0; i < tags->count && status == UZ_OK; i++)
-        list[i] = (tagged){tags->tag[i], i};
-    if (status == UZ_OK)
-        qsort(list, (size_t)tags->count, sizeof *list, compare_tagged);
-    for (int64_t i = 0; i < tags->count && status == UZ_OK; i++) {
-        tags->by_tag[i] = list[i].index;
-        if (i > 0 && list[i].tag == list[i - 1].tag)
-            status = abaqus_fail(text, UZ_ERR_FORMAT, "two %s have the number %lld", what, (long long)list[i].tag);
+    tags->by_tag = uz_order_of(tags->tag, tags->count);
+    if (!tags->by_tag)
+        return abaqus_no_memory(text);
+    for (int64_t i = 1; i < tags->count; i++) {
+        const int64_t tag = tags->tag[tags->by_tag[i]];
+        if (tag == tags->tag[tags->by_tag[i - 1]])
+            return abaqus_fail(text, UZ_ERR_FORMAT, "two %s have the number %lld", what, (long long)tag);
     }
-    free(list);
-    return status;
+    return UZ_OK;
 }
 
 int64_t abaqus_tags_at(const abaqus_tags *tags, int64_t tag)
 {
-    int64_t low = 0, high = tags->count;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (tags->tag[abaqus_tags_index(tags, middle)] < tag)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
+    return uz_order_seek(tags->tag, tags->by_tag, tags->count, tag);
 }
 
 int64_t abaqus_tags_find(const abaqus_tags *tags, int64_t tag)

@@ -65,8 +65,7 @@ uz_status abaqus_real(double *value, const char *field, const char *what, const 
 typedef struct {
     int64_t count, room;
     int64_t *tag;    /* count */
-    int64_t *by_tag; /* count, by abaqus_tags_sort: indices, by tag */
-    bool ascending;  /* as they came: by_tag is not needed */
+    int64_t *by_tag; /* count, by abaqus_tags_sort: indices, by tag; NULL: they ascend as they came */
 } abaqus_tags;
 /* Prepares abaqus_tags_at and _find; refuses a number that two have. */
 uz_status abaqus_tags_sort(abaqus_tags *tags, const char *what, const abaqus_text *text);
@@ -74,7 +73,7 @@ uz_status abaqus_tags_sort(abaqus_tags *tags, const char *what, const abaqus_tex
 int64_t abaqus_tags_at(const abaqus_tags *tags, int64_t tag);
 static inline int64_t abaqus_tags_index(const abaqus_tags *tags, int64_t place)
 {
-    return tags->ascending ? place : tags->by_tag[place];
+    return tags->by_tag ? tags->by_tag[place] : place;
 }
 int64_t abaqus_tags_find(const abaqus_tags *tags, int64_t tag); /* its index, -1: there is none */
 

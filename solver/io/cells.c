@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/order.h"
 #include "scene/given.h"
 
 #include <stdio.h>
@@ -87,41 +88,25 @@ uz_status cells_add_member(cells *mesh, int64_t set, int64_t index, int64_t line
     return check_size(mesh, line);
 }
 
-typedef struct {
-    int64_t value, index;
-} valued;
-
-static int compare_valued(const void *a, const void *b)
-{
-    const valued *x = a, *y = b;
-    return x->value != y->value ? (x->value > y->value) - (x->value < y->value)
-                                : (x->index > y->index) - (x->index < y->index);
-}
-
 uz_status cells_add_values(cells *mesh, const char *name, const int64_t *value, bool nodes, int64_t most, int64_t line)
 {
     const int64_t n = nodes ? mesh->n_nodes : mesh->n_cells;
-    int64_t count = 0, values = 0, set = -1;
-    valued *list = uz_alloc(n, sizeof *list);
-    uz_status status = list ? UZ_OK : uz_no_memory(mesh->err, "the mesh");
-    for (int64_t i = 0; i < n && status == UZ_OK; i++)
-        if (value[i] != CELLS_NO_VALUE)
-            list[count++] = (valued){value[i], i};
-    if (count > 1)
-        qsort(list, (size_t)count, sizeof *list, compare_valued);
-    for (int64_t i = 0; i < count; i++)
-        values += i == 0 || list[i].value != list[i - 1].value;
-    if (most > 0 && values > most)
-        count = 0;
-    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+    int64_t begin = 0, values = 0, set = -1;
+    int64_t *order = uz_order_of(value, n);
+    uz_status status = order ? UZ_OK : uz_no_memory(mesh->err, "the mesh");
+    while (order && begin < n && value[order[begin]] == CELLS_NO_VALUE)
+        begin++;
+    for (int64_t i = begin; order && i < n; i++)
+        values += i == begin || value[order[i]] != value[order[i - 1]];
+    for (int64_t i = begin; i < n && status == UZ_OK && (most <= 0 || values <= most); i++) {
         char full[160];
-        snprintf(full, sizeof full, "%.120s_%lld", name, (long long)list[i].value);
-        if (i == 0 || list[i].value != list[i - 1].value)
+        snprintf(full, sizeof full, "%.120s_%lld", name, (long long)value[order[i]]);
+        if (i == begin || value[order[i]] != value[order[i - 1]])
             status = cells_add_set(&set, mesh, full, nodes, line);
         if (status == UZ_OK)
-            status = cells_add_member(mesh, set, list[i].index, line);
+            status = cells_add_member(mesh, set, order[i], line);
     }
-    free(list);
+    free(order);
     return status;
 }
 

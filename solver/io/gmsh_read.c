@@ -2,6 +2,7 @@
 #include "io/gmsh.h"
 
 #include "core/alloc.h"
+#include "core/order.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -135,16 +136,6 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
 
 /* ---- nodes */
 
-typedef struct {
-    int64_t tag, index;
-} tagged_node;
-
-static int compare_tagged(const void *a, const void *b)
-{
-    const tagged_node *x = a, *y = b;
-    return (x->tag > y->tag) - (x->tag < y->tag);
-}
-
 #define TWICE "$Nodes has two nodes with the number %lld"
 
 /* Prepares gmsh_find_node. */
@@ -177,20 +168,15 @@ static uz_status list_tags(gmsh_file *file)
         return UZ_OK;
     }
     /* Other tags: the nodes in the order of their tags. */
-    tagged_node *node = uz_alloc(file->n_nodes, sizeof *node);
-    file->by_tag = uz_alloc(file->n_nodes, sizeof *file->by_tag);
-    uz_status status = node && file->by_tag ? UZ_OK : gmsh_no_memory(file);
-    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)
-        node[i] = (tagged_node){file->tag[i], i};
-    if (status == UZ_OK)
-        qsort(node, (size_t)file->n_nodes, sizeof *node, compare_tagged);
-    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++) {
-        file->by_tag[i] = node[i].index;
-        if (i > 0 && node[i].tag == node[i - 1].tag)
-            status = gmsh_fail(&file->text, UZ_ERR_FORMAT, TWICE, (long long)node[i].tag);
+    file->by_tag = uz_order_of(file->tag, file->n_nodes);
+    if (!file->by_tag)
+        return gmsh_no_memory(file);
+    for (int64_t i = 1; i < file->n_nodes; i++) {
+        const int64_t tag = file->tag[file->by_tag[i]];
+        if (tag == file->tag[file->by_tag[i - 1]])
+            return gmsh_fail(&file->text, UZ_ERR_FORMAT, TWICE, (long long)tag);
     }
-    free(node);
-    return status;
+    return UZ_OK;
 }
 
 uz_status gmsh_read_nodes(gmsh_file *file)
@@ -259,13 +245,7 @@ int64_t gmsh_find_node(const gmsh_file *file, int64_t tag)
 {
     if (file->dense)
         return tag >= file->low_tag && tag - file->low_tag < file->n_by_tag ? file->by_tag[tag - file->low_tag] : -1;
-    int64_t low = 0, high = file->by_tag ? file->n_nodes : 0;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (file->tag[file->by_tag[middle]] < tag)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return file->by_tag && low < file->n_nodes && file->tag[file->by_tag[low]] == tag ? file->by_tag[low] : -1;
+    const int64_t place = uz_order_seek(file->tag, file->by_tag, file->n_nodes, tag);
+    const int64_t index = place < file->n_nodes ? file->by_tag[place] : -1;
+    return index >= 0 && file->tag[index] == tag ? index : -1;
 }
