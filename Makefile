@@ -74,6 +74,9 @@ H_FILES    := $(if $(HAS_PETSC),$(wildcard solver/group/worker/*.h)) $(wildcard 
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
+# The client's manual page and completions, which it has from its table of commands.
+MANUAL     := $(addprefix $(BUILD)/uzawa.,1 bash zsh fish)
+
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 # Builds with sanitizers, which have a BUILD of their own, take from the ordinary one what they need not look at. Under
 # ThreadSanitizer that is the client, and rooms that know of no thread: they touch what their caller has given them.
@@ -92,8 +95,8 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all wheel deb group deps-group demo gallery run man guide install clean help deps deps-test
-all: $(BUILD)/uzawad $(BUILD)/uzawa $(if $(HAS_PETSC),$(BUILD)/uzawa-group) ## build the daemon and the client, and uzawa-group where PETSc is
+.PHONY: all wheel deb group deps-group demo gallery run guide install clean help deps deps-test
+all: $(BUILD)/uzawad $(BUILD)/uzawa $(MANUAL) $(if $(HAS_PETSC),$(BUILD)/uzawa-group) ## build the daemon and the client, and uzawa-group where PETSc is
 
 # After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
 build_programs = @$(MAKE) --no-print-directory -q all 2>/dev/null || echo "building the daemon and the client"; \
@@ -133,18 +136,14 @@ wheel: ## build the wheel of the Python package in build/python (python3-pip, -s
 	@cp -r client/python $(BUILD)/python/source
 	@$(PYTHON) -m pip wheel -q --no-deps --no-build-isolation --no-cache-dir --disable-pip-version-check -w $(BUILD)/python $(BUILD)/python/source
 
-man: $(BUILD)/uzawa ## renew the client's manual page and completions, which follow from its table of commands
-	@$(BUILD)/uzawa help --format man >client/uzawa.1
-	@$(foreach shell,bash zsh fish,$(BUILD)/uzawa help --format $(shell) >client/uzawa.$(shell);)
-
 install: all ## install both programs, the manual page and the completions under PREFIX
 	install -D -m 755 $(BUILD)/uzawad $(DESTDIR)$(PREFIX)/bin/uzawad
 	install -D -m 755 $(BUILD)/uzawa $(DESTDIR)$(PREFIX)/bin/uzawa
 	$(if $(HAS_PETSC),install -D -m 755 $(BUILD)/uzawa-group $(DESTDIR)$(PREFIX)/bin/uzawa-group)
-	install -D -m 644 client/uzawa.1 $(DESTDIR)$(PREFIX)/share/man/man1/uzawa.1
-	install -D -m 644 client/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
-	install -D -m 644 client/uzawa.zsh $(DESTDIR)$(PREFIX)/share/zsh/vendor-completions/_uzawa
-	install -D -m 644 client/uzawa.fish $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/uzawa.fish
+	install -D -m 644 $(BUILD)/uzawa.1 $(DESTDIR)$(PREFIX)/share/man/man1/uzawa.1
+	install -D -m 644 $(BUILD)/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
+	install -D -m 644 $(BUILD)/uzawa.zsh $(DESTDIR)$(PREFIX)/share/zsh/vendor-completions/_uzawa
+	install -D -m 644 $(BUILD)/uzawa.fish $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/uzawa.fish
 
 deb: all ## pack both programs, the unit of systemd and its configuration for Debian: build/uzawa_VERSION_ARCHITECTURE.deb
 	@rm -rf $(BUILD)/deb
@@ -177,6 +176,9 @@ $(BUILD)/uzawad: $(SERVER_OBJ) $(BUILD)/libuzawa.a
 # Of the library it takes what both programs share (solver/text) and nothing that needs a library of the solver's.
 $(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
+
+$(MANUAL): $(BUILD)/uzawa
+	@$< help --format $(patsubst .%,%,$(patsubst .1,.man,$(suffix $@))) >$@.new && mv $@.new $@
 
 # PETSc's macros for memory convert signed sizes in whoever uses them. It has a heap and handlers of its own, and runs
 # under mpirun: no sanitizer, and what it has of the solver is that of the ordinary build.

@@ -47,7 +47,7 @@ static void print_values(FILE *to, client_command command)
 
 static void print_bash(FILE *to)
 {
-    fputs("# Completion of uzawa for bash. Made from client/arguments/commands.c by make man.\n\n"
+    fputs("# Completion of uzawa for bash. Made from client/arguments/commands.c.\n\n"
           "# The newest jobs, if the service answers at once.\n"
           "_uzawa_ids() {\n    \"${COMP_WORDS[0]}\" list --quiet --limit 20 --retry 0 --timeout 1 2>/dev/null\n}\n\n"
           "_uzawa() {\n"
@@ -158,7 +158,7 @@ static void print_zsh_options(FILE *to, int command)
 
 static void print_zsh(FILE *to)
 {
-    fputs("#compdef uzawa\n# Completion of uzawa for zsh. Made from client/arguments/commands.c by make man.\n\n"
+    fputs("#compdef uzawa\n# Completion of uzawa for zsh. Made from client/arguments/commands.c.\n\n"
           "# The newest jobs, if the service answers at once.\n"
           "_uzawa_ids() {\n    local -a ids\n"
           "    ids=(${(f)\"$(uzawa list --quiet --limit 20 --retry 0 --timeout 1 2>/dev/null)\"})\n"
@@ -231,7 +231,7 @@ static void print_fish_options(FILE *to, int command)
 
 static void print_fish(FILE *to)
 {
-    fputs("# Completion of uzawa for fish. Made from client/arguments/commands.c by make man.\n\n"
+    fputs("# Completion of uzawa for fish. Made from client/arguments/commands.c.\n\n"
           "# The newest jobs, if the service answers at once.\n"
           "function __uzawa_ids\n    uzawa list --quiet --limit 20 --retry 0 --timeout 1 2>/dev/null\nend\n\n"
           "function __uzawa_commands\n    printf '%s\\n'",

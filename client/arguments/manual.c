@@ -142,7 +142,7 @@ static void print_command(FILE *to, client_command command)
 
 void client_manual_print(FILE *to)
 {
-    fputs(".\\\" Made from client/arguments/commands.c and manual.c by make man.\n"
+    fputs(".\\\" Made from client/arguments/commands.c and manual.c.\n"
           ".Dd November 21, 2026\n.Dt UZAWA 1\n.Os\n.Sh NAME\n.Nm uzawa\n"
           ".Nd solve frictionless contact problems by a contact solver service\n"
           ".Sh SYNOPSIS\n.Nm uzawa\n.Op Fl s Ar URL\n.Op Fl t Ar S\n.Ar command\n.Op Ar operand\n.Op Ar options\n"

@@ -17,7 +17,7 @@ from test_client_requests import DECK, GMSH
 
 BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "build").resolve()
 CLIENT = str(BUILD / "uzawa")
-MANUAL, COMPLETION = ROOT / "client/uzawa.1", ROOT / "client/uzawa.bash"
+MANUAL, COMPLETION = BUILD / "uzawa.1", BUILD / "uzawa.bash"
 SHELLS = {"zsh": "share/zsh/vendor-completions/_uzawa", "fish": "share/fish/vendor_completions.d/uzawa.fish"}
 
 
@@ -27,13 +27,6 @@ def text_of(*words):
 
 def commands():
     return json.loads(text_of("help", "--json"))["commands"]
-
-
-@options(None)
-def test_files_are_what_the_client_says(_):
-    check(MANUAL.read_text() == text_of("help", "--format", "man"), "make man renews client/uzawa.1")
-    for shell in ("bash", *SHELLS):
-        check((ROOT / f"client/uzawa.{shell}").read_text() == text_of("help", "--format", shell), f"make man renews client/uzawa.{shell}")
 
 
 @options(None)
@@ -184,7 +177,7 @@ def run_shell(command, server, script=None):
 
 def of_fish(line, server=None):
     """What fish offers at the end of the line."""
-    script = f"source {ROOT / 'client/uzawa.fish'}; complete -C {line!r}"
+    script = f"source {BUILD / 'uzawa.fish'}; complete -C {line!r}"
     return [one.split("\t")[0] for one in run_shell(["fish", "--no-config", "-c", script], server).splitlines()]
 
 
@@ -204,7 +197,7 @@ def test_completion_of_fish(server):
 @options(None)
 def test_completion_of_zsh(server):
     folder = pathlib.Path(server.folder)
-    (folder / "_uzawa").write_text((ROOT / "client/uzawa.zsh").read_text())
+    (folder / "_uzawa").write_text((BUILD / "uzawa.zsh").read_text())
     (folder / ".zshrc").write_text("PS1='READY '; fpath=($ZDOTDIR $fpath); autoload -U compinit; compinit -u -D\n"
                                    "zstyle ':completion:*' verbose no; LISTMAX=0; unsetopt beep; unset zle_bracketed_paste\n")
     environment = {"ZDOTDIR": str(folder), "PATH": f"{BUILD}:{os.environ['PATH']}", "UZAWA_SERVER": "http://127.0.0.1:1",
@@ -231,7 +224,7 @@ def test_install_puts_them_where_they_are_found(server):
     check((root / "share/man/man1/uzawa.1").read_text() == MANUAL.read_text())
     check((root / "share/bash-completion/completions/uzawa").read_text() == COMPLETION.read_text())
     for shell, place in SHELLS.items():
-        check((root / place).read_text() == (ROOT / f"client/uzawa.{shell}").read_text(), shell)
+        check((root / place).read_text() == (BUILD / f"uzawa.{shell}").read_text(), shell)
     check(os.access(root / "bin/uzawa", os.X_OK))
 
 
