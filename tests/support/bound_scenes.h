@@ -5,7 +5,9 @@
 
 #include "assembly/assembly.h"
 #include "body_fixture.h"
+#include "bound/bound.h"
 #include "generated.h"
+#include "linalg/blas.h"
 #include "scene_fixture.h"
 
 static const char *const BOUND_ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8"};
@@ -21,6 +23,54 @@ static inline uz_result *bound_answer(const uz_problem *problem, bool guaranteed
     if (status != UZ_OK)
         exit(1);
     return result;
+}
+
+static inline uz_guarantee bound_of(const uz_scene *scene)
+{
+    uz_result *result = bound_answer(&(uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = *scene}, true);
+    const uz_guarantee g = result->summary.guarantee;
+    uz_result_free(result);
+    return g;
+}
+
+/* The dual problem of an element alone, of straight sides between corners xy (of 8 numbers), has so many unknowns, and
+ * so many motions without stiffness. */
+static inline void check_element_alone(uz_model kind, const double *xy, int corners, int degree, int64_t unknowns,
+                                       int motions)
+{
+    double xyz[16], A[24 * 24] = {0};
+    int64_t first[] = {0, degree * corners}, node[] = {0, 1, 2, 3, 4, 5, 6, 7}, pivot[24], *dof;
+    unsigned char kinds[] = {
+        (unsigned char)(degree == 1 ? (corners == 3 ? UZ_TRI3 : UZ_QUAD4) : (corners == 3 ? UZ_TRI6 : UZ_QUAD8))};
+    uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
+    uz_body_material own = {.lame = uz_lame_of(kind, 1, 0.3)};
+    const uz_scene scene = {
+        .model = kind, .thickness = 1, .source = UZ_MESH_GIVEN, .n_materials = 1, .materials = &material};
+    uz_body_model model = {.kind = kind, .thickness = 1, .materials = &own};
+    uz_bound_body body;
+    uz_qp qp;
+    uz_error err = {0};
+    memcpy(xyz, xy, 8 * sizeof *xyz);
+    for (int k = 0; k < corners; k++)
+        for (int c = 0; c < 2; c++)
+            xyz[2 * (corners + k) + c] = (xy[2 * k + c] + xy[2 * ((k + 1) % corners) + c]) / 2;
+    model.mesh = (uz_mesh){.dim = 2, .n_nodes = degree * corners, .n_elements = 1, .extent = 10};
+    model.mesh.xyz = xyz;
+    model.mesh.kind = kinds;
+    model.mesh.first = first;
+    model.mesh.node = node;
+    CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
+    CHECK_STR(body.why, "");
+    CHECK_MSG(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK, "%s", err.message);
+    const int64_t n = qp.K.cols;
+    CHECK_INT(n, unknowns);
+    for (int64_t j = 0; j < n; j++)
+        for (int64_t k = qp.K.ptr[j]; k < qp.K.ptr[j + 1]; k++)
+            A[qp.K.idx[k] + n * j] = qp.K.val[k];
+    CHECK_INT(uz_pstrf_lower_while(n, A, pivot, 1e-11, NULL), n - motions);
+    uz_qp_clear(&qp);
+    free(dof);
+    uz_bound_body_clear(&body);
 }
 
 typedef struct {
@@ -277,6 +327,19 @@ static inline uz_scene bound_moved_scene(uint64_t seed, int kind, const char *el
     return scene;
 }
 
+static inline void take_bound(bound_sweep *x, const uz_guarantee *g, const uz_evaluation *evaluation)
+{
+    x->answers++;
+    x->proved += g->proved;
+    if (g->proved) {
+        x->lowest = fmin(x->lowest, g->primal);
+        x->highest = fmax(x->highest, g->dual);
+        x->size = fmax(x->size, fmax(fabs(g->primal), evaluation->strain_energy));
+    } else {
+        snprintf(x->why, sizeof x->why, "%.158s", g->why);
+    }
+}
+
 /* A body on meshes of all elements, the last, finer one to compare with. */
 typedef uz_scene (*bound_maker)(uint64_t seed, int kind, const char *element, int64_t n, bool coarsest);
 static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind, int64_t coarsest, int64_t finest)
@@ -301,15 +364,7 @@ static inline bound_sweep sweep_meshes(bound_maker make, uint64_t seed, int kind
             snprintf(x.why, sizeof x.why, "%.100s", err.message);
         } else {
             const uz_guarantee g = result->summary.guarantee;
-            x.answers++;
-            x.proved += g.proved;
-            if (g.proved) {
-                x.lowest = fmin(x.lowest, g.primal);
-                x.highest = fmax(x.highest, g.dual);
-                x.size = fmax(x.size, fmax(fabs(g.primal), result->summary.evaluation->strain_energy));
-            } else {
-                snprintf(x.why, sizeof x.why, "%.158s", g.why);
-            }
+            take_bound(&x, &g, result->summary.evaluation);
             if (g.proved && !last) {
                 linear[n] = k % 4 < 2 ? 0 : 1;
                 primal[n] = g.primal;
@@ -404,15 +459,7 @@ static inline bound_sweep sweep_differences(uint64_t seed, bound_kind kind, int6
                 continue;
             }
             const uz_guarantee g = result->summary.guarantee;
-            x.answers++;
-            x.proved += g.proved;
-            if (g.proved) {
-                x.lowest = fmin(x.lowest, g.primal);
-                x.highest = fmax(x.highest, g.dual);
-                x.size = fmax(x.size, fmax(fabs(g.primal), result->summary.evaluation->strain_energy));
-            } else {
-                snprintf(x.why, sizeof x.why, "%.158s", g.why);
-            }
+            take_bound(&x, &g, result->summary.evaluation);
             if (k == 0) {
                 reference = result;
                 fine = model;

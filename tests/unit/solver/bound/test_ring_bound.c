@@ -11,14 +11,6 @@ enum { RINGS = 12 };
 
 static qp_random shuffled = {1};
 
-static uz_guarantee bound_of(const uz_scene *scene)
-{
-    uz_result *result = bound_answer(&(uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = *scene}, true);
-    const uz_guarantee g = result->summary.guarantee;
-    uz_result_free(result);
-    return g;
-}
-
 /* Rules of n points: exact for polynomials of degree 2n - 1, and for no more; points within, weights positive. */
 TEST(gauss_rules)
 {
@@ -77,44 +69,9 @@ TEST(elements_leave_no_moment_without_stiffness)
     for (size_t shape = 0; shape < sizeof SHAPES / sizeof *SHAPES; shape++)
         for (int degree = 1; degree <= 2; degree++) {
             const int corners = SHAPES[shape].corners, at_axis = SHAPES[shape].at_axis;
-            const uz_element_kind kind =
-                degree == 1 ? (corners == 3 ? UZ_TRI3 : UZ_QUAD4) : (corners == 3 ? UZ_TRI6 : UZ_QUAD8);
-            double xyz[16], A[24 * 24] = {0};
-            int64_t first[] = {0, degree * corners}, node[] = {0, 1, 2, 3, 4, 5, 6, 7}, pivot[24], *dof;
-            unsigned char kinds[] = {(unsigned char)kind};
-            uz_material material = {.on = "all", .young = 1, .poisson = 0.3};
-            uz_scene scene = {.model = UZ_AXISYMMETRIC, .thickness = 1, .source = UZ_MESH_GIVEN, .n_materials = 1};
-            uz_body_model model = {.kind = UZ_AXISYMMETRIC, .thickness = 1};
-            uz_body_material own = {.lame = uz_lame_of(UZ_AXISYMMETRIC, 1, 0.3)};
-            uz_bound_body body;
-            uz_qp qp;
-            uz_error err = {0};
-            memcpy(xyz, SHAPES[shape].xy, sizeof SHAPES[shape].xy);
-            for (int k = 0; k < corners; k++)
-                for (int c = 0; c < 2; c++)
-                    xyz[2 * (corners + k) + c] = (xyz[2 * k + c] + xyz[2 * ((k + 1) % corners) + c]) / 2;
-            scene.materials = &material;
-            model.mesh = (uz_mesh){.dim = 2,
-                                   .n_nodes = degree * corners,
-                                   .n_elements = 1,
-                                   .xyz = xyz,
-                                   .kind = kinds,
-                                   .first = first,
-                                   .node = node,
-                                   .extent = 10};
-            model.materials = &own;
-            CHECK(uz_bound_body_make(&body, &model, &scene, &err) == UZ_OK);
-            CHECK_STR(body.why, "");
-            CHECK_MSG(uz_bound_dual_problem(&qp, &dof, &body, NULL, &err) == UZ_OK, "%s", err.message);
-            const int64_t n = qp.K.cols, axis = at_axis == 4 ? 2 * (degree + 3) : 2 * at_axis;
-            CHECK_INT(n, corners * 2 * (degree + 1) - axis);
-            for (int64_t j = 0; j < n; j++)
-                for (int64_t k = qp.K.ptr[j]; k < qp.K.ptr[j + 1]; k++)
-                    A[qp.K.idx[k] + n * j] = qp.K.val[k];
-            CHECK_INT(uz_pstrf_lower_while(n, A, pivot, 1e-11, NULL), n - 1);
-            uz_qp_clear(&qp);
-            free(dof);
-            uz_bound_body_clear(&body);
+            const int64_t axis = at_axis == 4 ? 2 * (degree + 3) : 2 * at_axis;
+            check_element_alone(UZ_AXISYMMETRIC, SHAPES[shape].xy, corners, degree, 2 * corners * (degree + 1) - axis,
+                                1);
         }
 }
 
