@@ -62,7 +62,7 @@ def ring(kind, cells, down, half=False):
 
 def test_a_ring_pressed_flat_is_as_half_of_it_on_a_plane(s):
     """Rows of two surfaces and of nodes on a plane: apart by what the mesh loses."""
-    for kind, cells, off in (("quad4", (64, 3), 5e-3), ("quad8", (48, 2), 1e-3)):
+    for kind, cells, off in some((("quad4", (64, 3), 5e-3), ("quad8", (48, 2), 1e-3))):
         whole, half = only(s, ring(kind, cells, 0.85)), only(s, ring(kind, (cells[0] // 2, cells[1]), 0.85, half=True))
         force = [one["summary"]["resultants"]["supports"][0]["force"][1] for one in (whole, half)]
         check(abs(force[0] / force[1] - 1) < off and force[0] < -0.02, kind, force)
