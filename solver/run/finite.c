@@ -283,6 +283,7 @@ static void end(uz_finite_run *run)
     free(run->prescribed);
     free(run->overlap);
     free(run->r);
+    uz_candidates_clear(&run->kept);
     free(run->p);
     free(run->v);
     free(run->Kv);

@@ -3,6 +3,7 @@
  *     uz_solve_finite    finite.c          load cases; the load put on in parts
  *     uz_finite_settle   finite_newton.c   the equilibrium under one part: contact problems on tangents
  *     uz_finite_place_find  finite_place.c  what follows from a displacement
+ *     uz_finite_solve_qp finite_rows.c     a contact problem, of the rows that may press
  *     uz_finite_chord    finite_chord.c    steps on the factor of the last one
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
@@ -19,6 +20,7 @@
 #include "core/hooks.h"
 #include "finite/finite_body.h"
 #include "finite/follower.h"
+#include "obstacle/candidates.h"
 #include "obstacle/obstacle.h"
 #include "post/interpenetration.h"
 #include "run/setup.h"
@@ -144,6 +146,7 @@ typedef struct {
     uz_finite_place at, trial;
     double *r; /* reactions of the rows that the last contact problem had, n_r of them */
     int64_t n_r;
+    uz_candidates kept;          /* those of its rows that it was made with (finite_rows.c); in NULL: all */
     double *p, *v, *Kv;          /* d: room */
     double *step, norm;          /* n: the last step; in the energy's norm, 0: not known, infinite: the first */
     double penalty, hold, shift; /* of merits; what the last tangent had added, see finite_newton.c */
@@ -176,11 +179,14 @@ void uz_finite_lead(double *to, const uz_finite_place *place, const double *v);
 uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 
 /* Of a matrix in run->tangent or run->wide that no factor is known of (uz_finite_forget_factors), until the deadline;
- * its time counts. Where run->r are of as many rows it begins with them. */
-uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err);
-/* The contact problem of run->K, p and at.h: run->last. */
+ * its time counts. Where the reactions r (n_r) are of as many rows it begins with them. */
+uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, double *r, int64_t n_r, uz_error *err);
+/* The contact problem of run->K, p and at.h: run->last, which is of all rows whatever run->kept becomes. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
-/* The setup of run->K and the rows of a place: that of a contact problem solved last, or, after
+/* Those rows of a body that run->kept has (the caller clears N), and those of numbers of all rows. */
+uz_status uz_finite_reduce(uz_csc *N, const uz_finite_run *run, const uz_body_model *rows, uz_error *err);
+void uz_finite_gather(double *out, const uz_finite_run *run, const double *all);
+/* The setup of run->K and of these rows of a place: that of a contact problem solved last, or, after
  * uz_finite_forget_factors, a new one. The caller releases it (run/setup_cache.h) to run->cache. */
 uz_status uz_finite_acquire(uz_setup **out, uz_finite_run *run, const uz_finite_place *place, uz_error *err);
 

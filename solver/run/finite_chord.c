@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "dual/dual.h"
 #include "linalg/blas.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -41,39 +42,61 @@ static void find_forces(uz_finite_run *run)
         }
 }
 
+/* Is none of the rows penetrated that the setup does not have, nor does one of them press? g (m): room. */
+static bool are_clear(const uz_finite_run *run, const double *v, double *g)
+{
+    const uz_finite_place *at = &run->at;
+    bool clear = true;
+    memcpy(g, at->gap, (size_t)at->rows.m * sizeof *g);
+    uz_csc_gaxpy(g, &at->rows.N, -1, v);
+    for (int64_t i = 0; i < at->rows.m && clear; i++)
+        clear = run->kept.in[i] || (run->r[i] == 0 && g[i] >= -NO_GAP * run->base.mesh.extent);
+    return clear;
+}
+
 uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_finite_run *run, const uz_setup *setup,
                           uz_error *err)
 {
     const uz_dual *dual = setup->dual;
     const uz_finite_place *at = &run->at;
     const uz_stop stop = {&run->hooks, run->deadline};
-    const int64_t d = run->d, m = at->rows.m;
+    const int64_t d = run->d, m = at->rows.m, kept = dual->m;
     uz_active_end end = UZ_ACTIVE_UNSOLVED;
     uz_dual_load *load = NULL;
-    double *g = uz_alloc(m, sizeof *g);
-    bool *pressing = uz_alloc(m, sizeof *pressing);
+    double *gap = uz_alloc(3 * kept + m, sizeof *gap), *s = NULL, *g = NULL;
+    bool *pressing = uz_alloc(kept, sizeof *pressing);
     uz_status status =
-        g && pressing ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld rows", (long long)m);
+        gap && pressing ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a step of %lld rows", (long long)m);
     *found = false;
     *norm = INFINITY;
-    for (int64_t i = 0; i < m && status == UZ_OK; i++)
-        pressing[i] = run->r[i] < 0;
     if (status == UZ_OK) {
+        s = gap + kept;
+        g = s + kept;
+        uz_finite_gather(s, run, run->r);
+        for (int64_t k = 0; k < kept; k++)
+            pressing[k] = s[k] < 0;
+        uz_finite_gather(gap, run, at->gap);
         find_forces(run);
-        status = uz_dual_load_create(&load, dual, run->K, run->p, at->gap, err);
+        status = uz_dual_load_create(&load, dual, run->K, run->p, gap, err);
     }
     if (status == UZ_OK)
         status = uz_dual_load_aim(load, run->settings.relative_error, &stop, err);
     if (status == UZ_OK)
-        status = uz_dual_load_solve_active(load, &end, r, g, pressing, err);
+        status = uz_dual_load_solve_active(load, &end, s, g, pressing, err);
     if (status == UZ_OK && end == UZ_ACTIVE_SOLVED) {
         *found = true;
-        status = uz_dual_load_recover(load, run->Kv, r, false, err);
+        status = uz_dual_load_recover(load, run->Kv, s, false, err);
     }
-    for (int64_t i = 0; i < m && *found; i++) {
+    if (*found && status == UZ_OK && run->kept.in)
+        *found = are_clear(run, run->Kv, g + kept);
+    for (int64_t i = 0, k = 0; i < m && *found; i++) {
         const bool presses = run->r[i] < 0;
-        r[i] = run->r[i] + r[i] * dual->row_scale[i];
-        *found = presses ? pressing[i] && r[i] < 0 : g[i] / dual->row_scale[i] >= -NO_GAP * run->base.mesh.extent;
+        r[i] = run->r[i];
+        if (run->kept.in && !run->kept.in[i])
+            continue;
+        r[i] += s[k] * dual->row_scale[k];
+        *found = presses ? pressing[k] && r[i] < 0 : g[k] / dual->row_scale[k] >= -NO_GAP * run->base.mesh.extent;
+        k++;
     }
     if (*found && status == UZ_OK) {
         uz_finite_restrict(run->v, at);
@@ -83,7 +106,7 @@ uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_f
         *norm = uz_finite_norm(run);
     }
     uz_dual_load_free(load);
-    free(g);
+    free(gap);
     free(pressing);
     return status;
 }

@@ -205,40 +205,32 @@ static uz_status name_matrix(uz_finite_run *run, const uz_csc *K, uz_error *err)
 
 uz_status uz_finite_acquire(uz_setup **out, uz_finite_run *run, const uz_finite_place *place, uz_error *err)
 {
-    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, place->rows.N, run->p, place->h}};
+    uz_csc N = {0};
     uz_reuse reused;
     *out = NULL;
-    const uz_status status = name_matrix(run, run->K, err);
-    return status == UZ_OK
-               ? uz_setup_acquire(out, &reused, run->cache, &problem, NULL, &run->settings, &run->hooks, err)
-               : status;
-}
-
-uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, uz_error *err)
-{
-    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
-    const uz_result near = {.m = run->n_r, .r = run->r};
-    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
-    uz_status status = name_matrix(run, &qp->K, err);
+    uz_status status = name_matrix(run, run->K, err);
     if (status == UZ_OK)
-        status = uz_solve_rounds(out, &problem, &run->settings, NULL, run->n_r > 0 ? &near : NULL, run->cache,
-                                 &run->hooks, err);
-    if (status == UZ_OK)
-        uz_timings_add(&run->spent, &(*out)->summary.timings);
+        status = uz_finite_reduce(&N, run, &place->rows, err);
+    if (status == UZ_OK) {
+        const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = {*run->K, N, run->p, place->h}};
+        status = uz_setup_acquire(out, &reused, run->cache, &problem, NULL, &run->settings, &run->hooks, err);
+    }
+    uz_csc_clear(&N);
     return status;
 }
 
-uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
+uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, double *r, int64_t n_r, uz_error *err)
 {
-    const uz_qp qp = {*run->K, run->at.rows.N, run->p, run->at.h};
-    uz_result *next = NULL;
-    const uz_status status = uz_finite_solve(&next, run, &qp, err);
-    if (status != UZ_OK)
-        return status;
-    run->found.qps++;
-    uz_result_free(run->last);
-    run->last = next;
-    return UZ_OK;
+    const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = *qp};
+    const uz_result near = {.m = n_r, .r = r};
+    run->settings.time_limit_s = fmax(0.0, run->deadline - uz_seconds());
+    uz_status status = name_matrix(run, &qp->K, err);
+    if (status == UZ_OK)
+        status =
+            uz_solve_rounds(out, &problem, &run->settings, NULL, n_r > 0 ? &near : NULL, run->cache, &run->hooks, err);
+    if (status == UZ_OK)
+        uz_timings_add(&run->spent, &(*out)->summary.timings);
+    return status;
 }
 
 /* Stiffness `factor` along the rows that were pressed, about their being closed: where they stay closed the answer is
@@ -836,6 +828,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     run->step_qps = 0;
     run->turned = false;
     run->at.work = 0;
+    uz_candidates_clear(&run->kept);
     if (status == UZ_OK)
         memcpy(begun, run->at.u, (size_t)run->n * sizeof *begun);
     if (status == UZ_OK) {

@@ -47,7 +47,7 @@ static uz_status solve_once(bool *solved, tangent *x, double *w, uz_error *err)
     const uz_qp linear = {.K = *run->K, .p = run->p};
     uz_result *result = NULL;
     uz_error own = {0};
-    uz_status status = uz_finite_solve(&result, run, &linear, &own);
+    uz_status status = uz_finite_solve(&result, run, &linear, run->r, run->n_r, &own);
     *solved = status == UZ_OK && is_solved(result);
     if (*solved)
         memcpy(w, result->u, (size_t)run->d * sizeof *w);
