@@ -132,10 +132,11 @@ static bool has_columns(const columns *of, int64_t node)
     return node >= of->from && node < of->to;
 }
 
-/* The block of two nodes whose dofs are all free, without questions. column: the first of the earlier one's; place: of
- * the later one's first row in it; ke: of that row and the first column, rows n apart. */
-static inline void add_whole_block(uz_csc *K, int64_t column, int64_t place, const double *ke, int n, int dim)
+/* The block of two nodes whose dofs are all free, without questions. column, row: the first of the earlier one's and of
+ * the later one's; ke: of these, rows n apart. */
+UZ_INLINE void add_whole_block(uz_csc *K, int64_t column, int64_t row, const double *ke, int n, int dim)
 {
+    const int64_t place = uz_csc_seek(K, row, column) - K->ptr[column];
     for (int64_t j = 0; j < dim; j++) {
         double *val = K->val + K->ptr[column + j] + place - j;
         for (int i = 0; i < dim; i++)
@@ -144,19 +145,10 @@ static inline void add_whole_block(uz_csc *K, int64_t column, int64_t place, con
 }
 
 /* The rows of a node stand together in every column, at a place that the column of another's first free dof tells: each
- * following one lacks the rows of that node before its diagonal. whole: all dofs of both are free. */
-static void add_block(uz_csc *K, const int64_t *column, const int64_t *row, const double *ke, int n, int dim,
-                      bool whole)
+ * following one lacks the rows of that node before its diagonal. */
+static void add_block(uz_csc *K, const int64_t *column, const int64_t *row, const double *ke, int n, int dim)
 {
     int64_t place = -1, first_column = 0;
-    if (whole) {
-        place = uz_csc_find(K, row[0], column[0]) - K->ptr[column[0]];
-        if (dim == 3)
-            add_whole_block(K, column[0], place, ke, n, 3);
-        else
-            add_whole_block(K, column[0], place, ke, n, 2);
-        return;
-    }
     for (int j = 0; j < dim; j++) {
         int64_t at = 0;
         for (int i = 0; i < dim && column[j] >= 0; i++) {
@@ -169,6 +161,23 @@ static void add_block(uz_csc *K, const int64_t *column, const int64_t *row, cons
             K->val[K->ptr[column[j]] + place - (column[j] - first_column) + at++] += ke[i * n + j];
         }
     }
+}
+
+/* The columns of a node whose dofs are all free: its own block's lower triangle, at the head of each, and the blocks of
+ * later nodes; of those that are not free as well: add_block. */
+UZ_INLINE void add_whole_node(uz_csc *K, const int64_t *const *dof, const bool *free, const double *ke,
+                              const int64_t *node, int count, int a, int dim)
+{
+    const int n = count * dim;
+    const int64_t column = dof[a][0];
+    for (int j = 0; j < dim; j++)
+        for (int i = j; i < dim; i++)
+            K->val[K->ptr[column + j] + i - j] += ke[(a * dim + i) * n + a * dim + j];
+    for (int b = 0; b < count; b++)
+        if (node[b] > node[a] && free[b])
+            add_whole_block(K, column, dof[b][0], ke + b * dim * n + a * dim, n, dim);
+        else if (node[b] > node[a])
+            add_block(K, dof[a], dof[b], ke + b * dim * n + a * dim, n, dim);
 }
 
 /* What dof j of node a has of a stiffness in its own block and, where it is supported, in K_fixed. */
@@ -218,11 +227,15 @@ static void add_to_columns(uz_body_model *model, const columns *of, const double
     for (int a = 0; a < count; a++) {
         if (!has_columns(of, node[a]))
             continue;
-        for (int j = 0; j < dim; j++)
+        for (int j = 0; j < dim && !free[a]; j++)
             add_own(model, ke, dof, n, a, j);
-        for (int b = 0; b < count; b++)
+        for (int b = 0; b < count && !free[a]; b++)
             if (node[b] > node[a])
-                add_block(&model->K, dof[a], dof[b], ke + b * dim * n + a * dim, n, dim, free[a] && free[b]);
+                add_block(&model->K, dof[a], dof[b], ke + b * dim * n + a * dim, n, dim);
+        if (free[a] && dim == 2)
+            add_whole_node(&model->K, dof, free, ke, node, count, a, 2);
+        else if (free[a])
+            add_whole_node(&model->K, dof, free, ke, node, count, a, 3);
     }
 }
 
