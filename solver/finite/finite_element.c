@@ -335,22 +335,49 @@ UZ_INLINE void add_rows(double *ke, const points *at, const uz_finite_rule *rule
                         sum[r][k][w] += t[r][AROUND] * *uz_four_from(&at->G[g][3][LANES * w]);
                 }
     }
-    for (int r = 0; r < rows; r++)
+    for (int r = 0; r < rows; r++) {
+        double *row = ke + (dim * a + i + r) * n;
         for (int w = first; w < wide; w++)
-            for (int lane = 0; lane < LANES && LANES * w + lane < rule->nodes; lane++)
-                for (int k = 0; k < dim; k++) {
-                    const int p = dim * a + i + r, q = dim * (LANES * w + lane) + k;
-                    ke[p * n + q] = ke[q * n + p] = sum[r][k][w][lane];
-                }
+            if (dim == 2 && LANES * (w + 1) <= rule->nodes) { /* (x, y) of each node */
+                const four x = sum[r][0][w], y = sum[r][1][w];
+                *uz_four_at(&row[2 * LANES * w]) = (four){x[0], y[0], x[1], y[1]};
+                *uz_four_at(&row[2 * LANES * w + LANES]) = (four){x[2], y[2], x[3], y[3]};
+            } else {
+                for (int lane = 0; lane < LANES && LANES * w + lane < rule->nodes; lane++)
+                    for (int k = 0; k < dim; k++)
+                        row[dim * (LANES * w + lane) + k] = sum[r][k][w][lane];
+            }
+    }
+}
+
+/* Rows of four nodes, from `first` fours on. */
+UZ_INLINE void add_four(double *ke, const points *at, const uz_finite_rule *rule, int first, int dim, int wide,
+                        bool ring)
+{
+    const int rows = dim == 2 ? 2 : 1; /* what registers hold */
+    for (int a = LANES * first; a < LANES * (first + 1) && a < rule->nodes; a++)
+        for (int i = 0; i < dim; i += rows)
+            add_rows(ke, at, rule, a, i, rows, first, dim, wide, ring);
 }
 
 UZ_INLINE void tangent_of(double *ke, const points *at, const uz_finite_rule *rule, int dim, int wide, bool ring)
 {
-    const int rows = dim == 2 ? 2 : 1; /* what registers hold */
-    for (int first = 0; first < wide; first++)
-        for (int a = LANES * first; a < LANES * (first + 1) && a < rule->nodes; a++)
-            for (int i = 0; i < dim; i += rows)
-                add_rows(ke, at, rule, a, i, rows, first, dim, wide, ring);
+    const int n = dim * rule->nodes, group = dim * LANES;
+    add_four(ke, at, rule, 0, dim, wide, ring); /* each by itself: sums stay in registers where it is a constant */
+    if (wide > 1)
+        add_four(ke, at, rule, 1, dim, wide, ring);
+    if (wide > 2)
+        add_four(ke, at, rule, 2, dim, wide, ring);
+    if (wide > 3)
+        add_four(ke, at, rule, 3, dim, wide, ring);
+    if (wide > 4)
+        add_four(ke, at, rule, 4, dim, wide, ring);
+    for (int p = 0; p < n; p++) { /* within fours the later row counts, which saw all that the earlier one did */
+        for (int q = p + 1; q < n && q < (p / group + 1) * group; q++)
+            ke[p * n + q] = ke[q * n + p];
+        for (int q = (p / group + 1) * group; q < n; q++)
+            ke[q * n + p] = ke[p * n + q];
+    }
 }
 
 /* ---- an element */

@@ -32,9 +32,16 @@ typedef struct {
 /* H[c][j]: the derivative of u_c by x_j; of rings [2][2] is u_r / r, in the plane else the others with a 2 are 0. */
 typedef double uz_gradients[3][3][UZ_FINITE_POINTS];
 
-/* D[c][i]: derivatives by local coordinates at four points from `first` on, of values (nodes x dim), against those of
- * the first node: a translation leaves no rounding. */
-UZ_INLINE void uz_differentiate(uz_four D[3][3], const uz_finite_rule *rule, const double *value, int first, int dim)
+/* Of values (nodes x dim) what they are more than those of the first node: a translation leaves no rounding. */
+UZ_INLINE void uz_from_first(double way[UZ_ELEMENT_DOFS], const uz_finite_rule *rule, const double *value, int dim)
+{
+    for (int a = 0; a < rule->nodes; a++)
+        for (int c = 0; c < dim; c++)
+            way[dim * a + c] = value[dim * a + c] - value[c];
+}
+
+/* D[c][i]: derivatives of these by local coordinates at four points from `first` on. */
+UZ_INLINE void uz_differentiate(uz_four D[3][3], const uz_finite_rule *rule, const double *way, int first, int dim)
 {
     for (int c = 0; c < dim; c++)
         for (int i = 0; i < dim; i++)
@@ -43,7 +50,7 @@ UZ_INLINE void uz_differentiate(uz_four D[3][3], const uz_finite_rule *rule, con
         for (int i = 0; i < dim; i++) {
             const uz_four slope = *uz_four_from(&rule->at_points[a][i][first]);
             for (int c = 0; c < dim; c++)
-                D[c][i] += slope * (value[dim * a + c] - value[c]);
+                D[c][i] += slope * way[dim * a + c];
         }
 }
 
@@ -64,9 +71,11 @@ UZ_INLINE void uz_find_radii(uz_rest *out, const uz_finite_rule *rule, const dou
 
 UZ_INLINE void uz_rest_of(uz_rest *out, const uz_finite_rule *rule, const uz_element *element, int dim, bool ring)
 {
+    double way[UZ_ELEMENT_DOFS];
+    uz_from_first(way, rule, element->xyz, dim);
     for (int p = 0; p < rule->points; p += UZ_FINITE_LANES) {
         uz_four X[3][3], inverse[3][3], det;
-        uz_differentiate(X, rule, element->xyz, p, dim);
+        uz_differentiate(X, rule, way, p, dim);
         uz_lane_invert(inverse, &det, X, dim);
         for (int i = 0; i < dim; i++)
             for (int j = 0; j < dim; j++)
@@ -81,9 +90,11 @@ UZ_INLINE void uz_rest_of(uz_rest *out, const uz_finite_rule *rule, const uz_ele
 UZ_INLINE void uz_find_gradients(uz_gradients H, const uz_finite_rule *rule, const uz_rest *at, const double *u,
                                  int dim, bool ring)
 {
+    double way[UZ_ELEMENT_DOFS];
+    uz_from_first(way, rule, u, dim);
     for (int p = 0; p < rule->points; p += UZ_FINITE_LANES) {
         uz_four D[3][3];
-        uz_differentiate(D, rule, u, p, dim);
+        uz_differentiate(D, rule, way, p, dim);
         for (int c = 0; c < dim; c++)
             for (int j = 0; j < dim; j++) {
                 uz_four sum = D[c][0] * *uz_four_from(&at->inverse[0][j][p]);
