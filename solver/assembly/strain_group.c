@@ -7,6 +7,7 @@
 #include "scene/mesh.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { LANES = UZ_STRAIN_LANES };
 
@@ -165,10 +166,14 @@ uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *f
     enum { BETWEEN_QUESTIONS = 1024 };
     const uz_body_model *model = from->model;
     const uz_mesh *mesh = &model->mesh;
-    uz_strain_group *groups = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *groups); /* one for each kind */
+    uz_strain_group *groups = uz_alloc(UZ_ELEMENT_KINDS, sizeof *groups); /* one for each kind, which are large */
     if (!groups)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strains of %lld elements",
                        (long long)mesh->n_elements);
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++) {
+        groups[kind].begun = false;
+        groups[kind].count = 0;
+    }
     const int64_t end = from->end > 0 ? from->end : mesh->n_elements;
     for (int64_t e = from->begin; e < end; e++) {
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
@@ -181,6 +186,8 @@ uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *f
             const uz_formulation formulation = uz_element_formulation(model, e);
             if (!g->begun || formulation != g->rule.formulation) {
                 finish(g, work, from);
+                if (!g->begun)
+                    memset(g, 0, sizeof *g);
                 work->rule(work->ctx, &g->rule, kind, formulation);
                 g->begun = true;
                 g->shaped = false;
