@@ -13,6 +13,8 @@ typedef long double real;
 
 /* Entries of F that may be other than 0. */
 static const int PLANE[] = {0, 1, 3, 4, 8}, ALL[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+/* Where they stand. */
+static const int ROW[] = {0, 0, 0, 1, 1, 1, 2, 2, 2}, COLUMN[] = {0, 1, 2, 0, 1, 2, 0, 1, 2};
 
 typedef struct {
     const int *at;
@@ -40,10 +42,10 @@ static void kirchhoff(uz_piola *out, real lambda, real mu, const real F[9], entr
     }
     const double first = (double)lambda, second = (double)mu;
     for (int p = 0; p < of.n; p++) {
-        const int i = of.at[p] / 3, J = of.at[p] % 3;
+        const int i = ROW[of.at[p]], J = COLUMN[of.at[p]];
         out->P[of.at[p]] = F[3 * i] * S[J] + F[3 * i + 1] * S[3 + J] + F[3 * i + 2] * S[6 + J];
         for (int q = 0; q <= p; q++) {
-            const int k = of.at[q] / 3, L = of.at[q] % 3;
+            const int k = ROW[of.at[q]], L = COLUMN[of.at[q]];
             out->A[of.at[p]][of.at[q]] = out->A[of.at[q]][of.at[p]] =
                 (i == k ? s[3 * J + L] : 0) + first * f[3 * i + J] * f[3 * k + L] +
                 second * ((J == L ? b[3 * i + k] : 0) + f[3 * i + L] * f[3 * k + J]);
@@ -56,8 +58,9 @@ static void kirchhoff(uz_piola *out, real lambda, real mu, const real F[9], entr
 static real cofactors(real G[9], const real F[9], entries of)
 {
     for (int p = 0; p < of.n; p++) {
-        const int i = of.at[p] / 3, j = of.at[p] % 3;
-        const int a = 3 * ((i + 1) % 3), b = 3 * ((i + 2) % 3), c = (j + 1) % 3, d = (j + 2) % 3;
+        static const int NEXT[] = {1, 2, 0}, LAST[] = {2, 0, 1};
+        const int i = ROW[of.at[p]], j = COLUMN[of.at[p]];
+        const int a = 3 * NEXT[i], b = 3 * LAST[i], c = NEXT[j], d = LAST[j];
         G[of.at[p]] = F[a + c] * F[b + d] - F[a + d] * F[b + c];
     }
     return F[0] * G[0] + F[1] * G[1] + F[2] * G[2];
@@ -93,7 +96,7 @@ void uz_piola_at(uz_piola *out, uz_elasticity law, real lambda, real mu, const r
         out->P[i] = a * F[i] + b * G[i];
         for (int q = 0; q <= p; q++) { /* (G dF' G)_ij with dF_kl = 1 is G_il G_kj */
             const int k = of.at[q];
-            const double crossed = g[3 * (i / 3) + k % 3] * g[3 * (k / 3) + i % 3];
+            const double crossed = g[3 * ROW[i] + COLUMN[k]] * g[3 * ROW[k] + COLUMN[i]];
             out->A[i][k] = out->A[k][i] =
                 (i == k ? own : 0) + mixed * (f[i] * g[k] + g[i] * f[k]) + twice * g[i] * g[k] - turned * crossed;
         }

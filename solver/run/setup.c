@@ -189,7 +189,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
         status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
     setup->law = setup->is_scene ? setup->model.law : &uz_law_frictionless;
-    if (status == UZ_OK)
+    if (status == UZ_OK && !settings->step) /* which has no certificate, as a rule: else it counts them itself */
         setup->terms = uz_most_terms(uz_setup_K(setup, problem), setup->model.brick, uz_setup_all_rows(setup, problem));
     setup->assemble_s = uz_seconds() - start;
     if (status == UZ_OK && setup->is_scene && uz_may_omit_rows(problem))
