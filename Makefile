@@ -195,9 +195,11 @@ $(BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) $(if $(filter tests/unit/%,$<),-O0,$(if $(SAN),-Wno-error)) -c -o $@ $<
 
-# Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
+# Contraction only saves roundings there; the double-double arithmetic of certificates must never have it, which clang
+# would give it within a statement.
 CONTRACTED := solver/amg/blocks.c solver/amg/cycle.c solver/amg/galerkin.c solver/factor/blocked.c solver/factor/refill.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c solver/finite/finite_element.c solver/finite/turning.c $(wildcard solver/brick/*.c)
 $(call obj,$(CONTRACTED)): CFLAGS += -ffp-contract=fast
+$(call obj,$(wildcard solver/certificate/*.c)): CFLAGS += -ffp-contract=off
 # Short loops of known length around the registers are unrolled.
 UNROLLED := solver/amg/blocks.c solver/amg/cg.c solver/amg/cycle.c solver/amg/galerkin.c solver/amg/hold.c solver/amg/multigrid.c solver/amg/prolong.c solver/amg/rough.c solver/certificate/finite.c solver/factor/single.c solver/methods/exchange.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/bound/*.c solver/brick/*.c solver/element/*.c solver/finite/*.c solver/post/*.c) solver/io/vtu.c
 # Where elements are, not with a sanitizer: its checks in every copy take a minute to compile, and tests gain less. Nor
