@@ -8,12 +8,15 @@
 #include "core/cpu.h"
 #include "core/error.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
-enum { LANES = 4, NODES = UZ_BRICK_NODES, DOFS = UZ_BRICK_DOFS };
+/* TOGETHER: rows of ke at a time, which do not wait for each other. */
+enum { LANES = 4, TOGETHER = 8, NODES = UZ_BRICK_NODES, DOFS = UZ_BRICK_DOFS };
 
 /* In the order of ke. */
 static const int CORNER[NODES][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -29,6 +32,7 @@ typedef struct {
     int64_t stride, plane;
     const double *x;
     double *hi, *lo;
+    double size[DOFS], begin[DOFS]; /* of multiply */
     int slabs;
     planes of[UZ_ASIDE_MOST];
 } whole;
@@ -64,25 +68,66 @@ static void clear(whole *w)
         }
 }
 
-/* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
-static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, const double *ke, const four *v,
-                                                           int count, int fused)
+/* Sums of a cell's row begin at a number that is at least BEYOND times each product: they stay between half of it and
+ * twice as much, whatever the signs, so that what an addition rounds off is known from the sum before and after it
+ * (docs/theory.md, rounding of sums). */
+#define BEYOND 64.0
+
+/* The products of a row are at most begin / BEYOND times the largest of the displacements, each times its size. */
+static void find_begins(whole *w)
 {
-    for (int row = 0; row < DOFS; row += 3) { /* three at a time do not wait for each other */
-        four sum[3] = {{0}}, rest[3] = {{0}};
-        for (int column = 0; column < DOFS; column++)
-            for (int r = 0; r < 3; r++) {
-                const double factor = ke[(row + r) * DOFS + column];
-                const four a = {factor, factor, factor, factor}, product = a * v[column];
-                four error = {0.0};
+    for (int j = 0; j < DOFS; j++)
+        w->size[j] = sqrt(w->brick->ke[(DOFS + 1) * j]);
+    for (int i = 0; i < DOFS; i++) {
+        double most = 0.0;
+        for (int j = 0; j < DOFS; j++)
+            most = fmax(most, fabs(w->brick->ke[DOFS * i + j]) / w->size[j]);
+        w->begin[i] = BEYOND * most;
+    }
+}
+
+/* The largest of the displacements, each times its size. */
+static inline __attribute__((always_inline)) void find_largest(four *largest, const whole *w, const four *v)
+{
+    four most = {0.0};
+    for (int column = 0; column < DOFS; column++) {
+        const four size = (four)((bits)v[column] & INT64_MAX) * w->size[column];
+        const bits more = size > most;
+        most = (four)(((bits)size & more) | ((bits)most & ~more));
+    }
+    *largest = most;
+}
+
+/* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
+static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, const whole *w, const four *v, int count,
+                                                           int fused)
+{
+    four most;
+    find_largest(&most, w, v);
+    for (int row = 0; row < DOFS; row += TOGETHER) {
+        four sum[TOGETHER], rest[TOGETHER] = {{0}};
+#pragma GCC unroll 8
+        for (int r = 0; r < TOGETHER; r++)
+            sum[r] = w->begin[row + r] * most;
+        for (int column = 0; column < DOFS; column++) {
+#pragma GCC unroll 8
+            for (int r = 0; r < TOGETHER; r++) {
+                const double factor = w->brick->ke[(row + r) * DOFS + column];
+                const four product = factor * v[column];
+                four next = sum[r] + product, error = {0.0};
+                for (int l = 0; fused && l < LANES; l++)
+                    next[l] = __builtin_fma(factor, v[column][l], sum[r][l]);
+                const four added = next - sum[r];
                 for (int l = 0; l < LANES; l++)
-                    error[l] = fused ? __builtin_fma(factor, v[column][l], -product[l])
-                                     : product_error_split(factor, v[column][l], product[l]);
-                const four next = sum[r] + product, back = next - sum[r];
-                rest[r] += ((sum[r] - (next - back)) + (product - back)) + error;
+                    error[l] = fused ? __builtin_fma(factor, v[column][l], -added[l])
+                                     : (product[l] - added[l]) + product_error_split(factor, v[column][l], product[l]);
+                rest[r] += error;
                 sum[r] = next;
             }
-        for (int r = 0; r < 3; r++) {
+        }
+#pragma GCC unroll 8
+        for (int r = 0; r < TOGETHER; r++) {
+            sum[r] -= w->begin[row + r] * most;
             for (int l = count; l < LANES; l++)
                 sum[r][l] = rest[r][l] = 0.0;
             hi[row + r] = sum[r];
@@ -102,7 +147,7 @@ static inline __attribute__((always_inline)) void layer(const whole *w, const pl
                 v[row] =
                     *(const four *)(p->x[corner[2]] + row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0]);
             }
-            multiply(hi, lo, w->brick->ke, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused);
+            multiply(hi, lo, w, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused);
             for (int row = 0; row < DOFS; row++) {
                 const int *corner = CORNER[row / 3];
                 const int64_t at = row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0];
@@ -240,6 +285,7 @@ uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_b
     w.x = x;
     w.hi = hi;
     w.lo = lo;
+    find_begins(&w);
     if (ok)
         uz_aside_share(multiply_slab, &w, w.slabs);
     clear(&w);
