@@ -176,31 +176,68 @@ typedef struct {
     void (*layer)(const uz_brick_product *, struct uz_brick_product_room *, const uz_brick *, const double *);
 } product;
 
+/* Nodes `begin` to end - 1 of a line, by component, of the dofs. */
+static void unpack_nodes(double *to, const product *p, const int64_t *dof, int64_t begin, int64_t end)
+{
+    for (int64_t i = begin; i < end; i++)
+        for (int c = 0; c < 3; c++) {
+            const int64_t own = dof[3 * i + c];
+            to[c * p->room->plane + i] = own >= 0 ? (p->x ? p->x[own] : 0.0) : p->value ? p->value[-1 - own] : 0.0;
+        }
+}
+
 /* A plane of nodes by component, of the dofs. */
 static void unpack(double *plane, const product *p, int64_t k)
 {
-    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1;
+    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1, apart = p->room->plane;
     const int64_t *dof = p->brick->dof + 3 * line * lines * k;
-    const double *x = p->x, *value = p->value;
-    for (int64_t j = 0; j < lines; j++) {
+    for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
         double *to = plane + j * p->room->stride;
-        for (int64_t i = 0; i < line; i++, dof += 3)
-            for (int c = 0; c < 3; c++)
-                to[c * p->room->plane + i] = dof[c] >= 0 ? (x ? x[dof[c]] : 0.0) : value ? value[-1 - dof[c]] : 0.0;
+        int64_t begin = 0, end = 0;
+        if (p->x)
+            uz_brick_run(&begin, &end, dof, line);
+        unpack_nodes(to, p, dof, 0, begin);
+        unpack_nodes(to, p, dof, end, line);
+        if (begin == end)
+            continue;
+        const double *restrict from = p->x + dof[3 * begin];
+        double *restrict x = to + begin, *restrict y = x + apart, *restrict z = y + apart;
+        for (int64_t i = 0; i < end - begin; i++) {
+            x[i] = from[3 * i];
+            y[i] = from[3 * i + 1];
+            z[i] = from[3 * i + 2];
+        }
     }
+}
+
+static void pack_nodes(const product *p, const int64_t *dof, const double *from, int64_t begin, int64_t end)
+{
+    for (int64_t i = begin; i < end; i++)
+        for (int c = 0; c < 3; c++)
+            if (dof[3 * i + c] >= 0)
+                p->y[dof[3 * i + c]] = from[c * p->room->plane + i];
 }
 
 /* The free dofs of a plane. */
 static void pack(const product *p, int64_t k, const double *plane)
 {
-    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1;
+    const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1, apart = p->room->plane;
     const int64_t *dof = p->brick->dof + 3 * line * lines * k;
-    for (int64_t j = 0; j < lines; j++) {
+    for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
         const double *from = plane + j * p->room->stride;
-        for (int64_t i = 0; i < line; i++, dof += 3)
-            for (int c = 0; c < 3; c++)
-                if (dof[c] >= 0)
-                    p->y[dof[c]] = from[c * p->room->plane + i];
+        int64_t begin, end;
+        uz_brick_run(&begin, &end, dof, line);
+        pack_nodes(p, dof, from, 0, begin);
+        pack_nodes(p, dof, from, end, line);
+        if (begin == end)
+            continue;
+        const double *restrict x = from + begin, *restrict y = x + apart, *restrict z = y + apart;
+        double *restrict to = p->y + dof[3 * begin];
+        for (int64_t i = 0; i < end - begin; i++) {
+            to[3 * i] = x[i];
+            to[3 * i + 1] = y[i];
+            to[3 * i + 2] = z[i];
+        }
     }
 }
 

@@ -15,4 +15,18 @@ typedef struct {
     uz_element element;                       /* what the cells are, for cells of other sizes; without xyz */
 } uz_brick;
 
+/* Of the nodes of a line, whose dofs are `dof`, those from *begin to *end - 1 have free dofs only, numbered one after
+ * the other; all that do, or none. */
+static inline void uz_brick_run(int64_t *begin, int64_t *end, const int64_t *dof, int64_t nodes)
+{
+    int64_t first = 0, last = nodes;
+    while (first < last && (dof[3 * first] < 0 || dof[3 * first + 1] < 0 || dof[3 * first + 2] < 0))
+        first++;
+    while (first < last && (dof[3 * last - 3] < 0 || dof[3 * last - 2] < 0 || dof[3 * last - 1] < 0))
+        last--;
+    const bool whole = first < last && dof[3 * last - 1] - dof[3 * first] == 3 * (last - first) - 1;
+    *begin = whole ? first : 0;
+    *end = whole ? last : 0;
+}
+
 #endif

@@ -161,14 +161,20 @@ static void hold_slab(void *ctx, int slab)
                   end = uz_brick_slab(n[2] + 1, slab + 1, x->slabs);
     const int64_t *dof = x->mg->brick->dof + 3 * (n[0] + 1) * (n[1] + 1) * first;
     for (int64_t k = first; k < end; k++)
-        for (int64_t j = 0; j <= n[1]; j++)
-            for (int64_t i = 0; i <= n[0]; i++, dof += 3) {
-                const int cells =
-                    (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
-                for (int c = 0; c < 3; c++)
-                    x->inverse[c * level->size + k * level->plane + j * level->stride + i] =
-                        dof[c] < 0 || (x->held && x->held[dof[c]]) ? 0.0F : 1.0F / ((float)cells * level->diagonal[c]);
+        for (int64_t j = 0; j <= n[1]; j++) {
+            const int cells = (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
+            float *to = x->inverse + k * level->plane + j * level->stride;
+            float outer[3], inner[3]; /* at the ends of a line, and between them */
+            for (int c = 0; c < 3; c++) {
+                outer[c] = 1.0F / ((float)cells * level->diagonal[c]);
+                inner[c] = 1.0F / ((float)(2 * cells) * level->diagonal[c]);
             }
+            for (int64_t i = 0; i <= n[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++)
+                    to[c * level->size + i] = dof[c] < 0 || (x->held && x->held[dof[c]]) ? 0.0F
+                                              : i > 0 && i < n[0]                        ? inner[c]
+                                                                                         : outer[c];
+        }
 }
 
 /* inverse of the first grid: 0 at supported dofs, those of `held` (d, NULL: none), and in the padding. */
@@ -313,24 +319,51 @@ static const int64_t *dofs_of_slab(const passage *p, int slab, int64_t *first, i
     return p->mg->brick->dof + 3 * (cells[0] + 1) * (cells[1] + 1) * *first;
 }
 
+/* Nodes `begin` to end - 1 of a line, whose first number stands at `at`. */
+static void read_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t begin, int64_t end)
+{
+    const int64_t size = p->mg->level[0].size;
+    for (int64_t i = begin; i < end; i++)
+        for (int c = 0; c < 3; c++) {
+            const int64_t own = c * size + at + i;
+            p->v->b[own] = p->v->inverse[own] != 0.0F ? (float)(p->factor * p->r[dof[3 * i + c]]) : 0.0F;
+        }
+}
+
 static void read_slab(void *ctx, int slab)
 {
     const passage *p = ctx;
     const double factor = p->factor;
     const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1;
-    int64_t first, end;
-    const int64_t *dof = dofs_of_slab(p, slab, &first, &end);
-    for (int64_t k = first; k < end; k++)
-        for (int64_t j = 0; j < lines; j++) {
-            float *b = p->v->b + k * level->plane + j * level->stride;
-            const float *inverse = p->v->inverse + k * level->plane + j * level->stride;
-            for (int64_t i = 0; i < line; i++, dof += 3)
-                for (int c = 0; c < 3; c++) {
-                    const int64_t at = c * level->size + i;
-                    b[at] = inverse[at] != 0.0F ? (float)(factor * p->r[dof[c]]) : 0.0F;
-                }
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, size = level->size;
+    int64_t first, last;
+    const int64_t *dof = dofs_of_slab(p, slab, &first, &last);
+    for (int64_t k = first; k < last; k++)
+        for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
+            const int64_t at = k * level->plane + j * level->stride;
+            int64_t begin, end;
+            uz_brick_run(&begin, &end, dof, line);
+            read_nodes(p, dof, at, 0, begin);
+            read_nodes(p, dof, at, end, line);
+            if (begin == end)
+                continue;
+            const double *restrict r = p->r + dof[3 * begin];
+            const float *x_free = p->v->inverse + at + begin, *y_free = x_free + size, *z_free = y_free + size;
+            float *restrict x = p->v->b + at + begin, *restrict y = x + size, *restrict z = y + size;
+            for (int64_t i = 0; i < end - begin; i++) {
+                x[i] = x_free[i] != 0.0F ? (float)(factor * r[3 * i]) : 0.0F;
+                y[i] = y_free[i] != 0.0F ? (float)(factor * r[3 * i + 1]) : 0.0F;
+                z[i] = z_free[i] != 0.0F ? (float)(factor * r[3 * i + 2]) : 0.0F;
+            }
         }
+}
+
+static void write_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t begin, int64_t end)
+{
+    for (int64_t i = begin; i < end; i++)
+        for (int c = 0; c < 3; c++)
+            if (dof[3 * i + c] >= 0)
+                p->z[dof[3 * i + c]] = p->factor * (double)p->v->x[c * p->mg->level[0].size + at + i];
 }
 
 static void write_slab(void *ctx, int slab)
@@ -338,16 +371,25 @@ static void write_slab(void *ctx, int slab)
     const passage *p = ctx;
     const double factor = p->factor;
     const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1;
-    int64_t first, end;
-    const int64_t *dof = dofs_of_slab(p, slab, &first, &end);
-    for (int64_t k = first; k < end; k++)
-        for (int64_t j = 0; j < lines; j++) {
-            const float *x = p->v->x + k * level->plane + j * level->stride;
-            for (int64_t i = 0; i < line; i++, dof += 3)
-                for (int c = 0; c < 3; c++)
-                    if (dof[c] >= 0)
-                        p->z[dof[c]] = factor * (double)x[c * level->size + i];
+    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, size = level->size;
+    int64_t first, last;
+    const int64_t *dof = dofs_of_slab(p, slab, &first, &last);
+    for (int64_t k = first; k < last; k++)
+        for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
+            const int64_t at = k * level->plane + j * level->stride;
+            int64_t begin, end;
+            uz_brick_run(&begin, &end, dof, line);
+            write_nodes(p, dof, at, 0, begin);
+            write_nodes(p, dof, at, end, line);
+            if (begin == end)
+                continue;
+            const float *restrict x = p->v->x + at + begin, *restrict y = x + size, *restrict z = y + size;
+            double *restrict to = p->z + dof[3 * begin];
+            for (int64_t i = 0; i < end - begin; i++) {
+                to[3 * i] = factor * (double)x[i];
+                to[3 * i + 1] = factor * (double)y[i];
+                to[3 * i + 2] = factor * (double)z[i];
+            }
         }
 }
 
