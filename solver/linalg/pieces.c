@@ -189,22 +189,37 @@ double uz_long_dot_single(int64_t n, const float *x, const float *y)
     return uz_sum_by_pieces(find_dot_single, &(single_vectors){x, y}, n);
 }
 
+/* The largest |x_j|, or |x_j y_j|: comparisons that do not wait for the one before. */
+static inline __attribute__((always_inline)) double largest(const double *x, const double *y, int64_t n)
+{
+    enum { APART = 8 };
+    double most[APART] = {0.0}, all = 0.0;
+    int64_t j = 0;
+    for (; j + APART <= n; j += APART)
+#pragma GCC unroll 8
+        for (int k = 0; k < APART; k++) {
+            const double size = fabs(y ? x[j + k] * y[j + k] : x[j + k]);
+            most[k] = size > most[k] ? size : most[k];
+        }
+    for (; j < n; j++) {
+        const double size = fabs(y ? x[j] * y[j] : x[j]);
+        all = size > all ? size : all;
+    }
+    for (int k = 0; k < APART; k++)
+        all = most[k] > all ? most[k] : all;
+    return all;
+}
+
 static double find_largest(void *ctx, int64_t begin, int64_t end)
 {
     const vectors *v = ctx;
-    double most = 0.0;
-    for (int64_t j = begin; j < end; j++)
-        most = fabs(v->x[j]) > most ? fabs(v->x[j]) : most;
-    return most;
+    return largest(v->x + begin, NULL, end - begin);
 }
 
 static double find_largest_product(void *ctx, int64_t begin, int64_t end)
 {
     const vectors *v = ctx;
-    double most = 0.0;
-    for (int64_t j = begin; j < end; j++)
-        most = fabs(v->x[j] * v->y[j]) > most ? fabs(v->x[j] * v->y[j]) : most;
-    return most;
+    return largest(v->x + begin, v->y + begin, end - begin);
 }
 
 static double find_most(of_piece of, int64_t n, const double *x, const double *y)
