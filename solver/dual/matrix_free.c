@@ -401,17 +401,21 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
  * supports move (by 70 times, a ring that is pressed together), and the certificate to that. */
 #define ACTIVE_FLOOR  0.5
 #define GUESSED_FLOOR 0.02
-/* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. Nobody bounds an answer by rows that pull.
- */
-static uz_status measure_slack(free_load *x, const double *e, const double *r, uz_error *err)
+
+/* Nobody bounds an answer by rows that pull: what it misses is left at INFINITY. */
+static bool may_bound(free_load *x, const double *r)
 {
-    const uz_dual *dual = x->sparse.load.dual;
     bool pulls = false;
-    for (int64_t i = 0; i < dual->m; i++)
+    for (int64_t i = 0; i < x->sparse.load.dual->m; i++)
         pulls = pulls || uz_reaction_pulls(r[i]);
     x->sparse.slack = x->held_slack = INFINITY;
-    if (pulls)
-        return UZ_OK;
+    return !pulls;
+}
+
+/* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. */
+static uz_status measure_slack(free_load *x, const double *e, uz_error *err)
+{
+    const uz_dual *dual = x->sparse.load.dual;
     const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.p, e, err);
     x->sparse.slack = x->held_slack = uz_root(uz_long_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
     return status;
@@ -444,18 +448,27 @@ static double goal_of(const free_load *x, double tolerance, double square)
            sqrt(x->sparse.load.dual->amg->info.lambda);
 }
 
-/* A long vector that another one goes to, taken off, as it is, or turned round: what is missing of equilibrium in cg->r
- * is what is left over in force. */
+/* A long vector that another one goes to, as it is, or turned round: what is missing of equilibrium in cg->r is what is
+ * left over in force. */
 typedef struct {
     double *to;
     const double *from;
 } moving;
 
-static void subtract(void *ctx, int64_t begin, int64_t end)
+/* K u in cg->r becomes p - K u. Returns u'K u. */
+static double leave_residual(void *ctx, int64_t begin, int64_t end)
 {
-    const moving *x = ctx;
-    for (int64_t j = begin; j < end; j++)
-        x->to[j] -= x->from[j];
+    enum { IN_CACHE = 2048 }; /* numbers, which stay in the cache */
+    const free_load *x = ctx;
+    const double *u = x->sparse.box->u, *p = x->sparse.p;
+    double *r = x->cg.r, sum = 0.0;
+    for (int64_t from = begin; from < end; from += IN_CACHE) {
+        const int64_t to = end - from < IN_CACHE ? end : from + IN_CACHE;
+        sum += uz_dot(to - from, u + from, r + from);
+        for (int64_t j = from; j < to; j++)
+            r[j] = p[j] - r[j];
+    }
+    return sum;
 }
 
 static void copy(void *ctx, int64_t begin, int64_t end)
@@ -498,9 +511,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     stepwise on_way = {x, g, active, least};
     double tolerance = fmax(least, x->coarse), *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
-    uz_sparse_multiply(load, box->force, box->u);
-    double square = uz_long_dot(d, box->u, box->force); /* u'K u */
-    uz_by_pieces(subtract, &(moving){box->force, x->sparse.p}, d);
+    uz_sparse_multiply(load, cg->r, box->u);
+    double square = uz_sum_by_pieces(leave_residual, x, d); /* u'K u */
     for (bool go_on = true; status == UZ_OK && go_on;) {
         const double goal = goal_of(x, tolerance, square);
         /* from 0 the first residual has the size of the solution */
@@ -519,15 +531,18 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
             stop.unchecked = least >= NO_DRIFT;
         }
         stop.begun = true;
-        uz_by_pieces(negate, &(moving){cg->r, box->force}, d);
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
-        const bool roughly = tolerance > least && (!stop.look || info.ended);
+        if (info.ended) /* and has told why: a row is wrong, by the force that the residual left */
+            break;
+        const bool roughly = tolerance > least && !stop.look;
         uz_bounded_balance(&x->sparse, roughly);
         square = uz_long_dot(d, box->u, box->force) + uz_long_dot(d, box->u, box->p);
-        go_on = looks_right(&on_way) && roughly && (info.met || info.ended);
+        go_on = looks_right(&on_way) && roughly && info.met;
         tolerance = least;
+        if (go_on)
+            uz_by_pieces(negate, &(moving){cg->r, box->force}, d);
     }
     memcpy(r, box->r, (size_t)m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
@@ -537,11 +552,12 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = status == UZ_OK ? freed : status;
     if (status != UZ_OK)
         return status;
-    /* the forces on free dofs, and on held ones what no row bears */
-    uz_by_pieces(copy, &(moving){e, box->force}, d);
-    for (int64_t i = 0; i < m; i++)
-        e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
-    status = measure_slack(x, e, box->r, err);
+    if (may_bound(x, box->r)) { /* the forces on free dofs, and on held ones what no row bears */
+        uz_by_pieces(copy, &(moving){e, box->force}, d);
+        for (int64_t i = 0; i < m; i++)
+            e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
+        status = measure_slack(x, e, err);
+    }
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
         load->psi0 =
@@ -621,8 +637,8 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
         status = solve_projected(x, part, &right, g, active, tolerance, tolerance > least, norm, err);
         right = right && tolerance > least;
     }
-    if (status == UZ_OK)
-        status = measure_slack(x, x->cg.z, x->r, err);
+    if (status == UZ_OK && may_bound(x, x->r))
+        status = measure_slack(x, x->cg.z, err);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
     const size_t bytes = uz_projected_bytes(part) + 8 * (size_t)(dual->d + dual->m);
     load->most = bytes > load->most ? bytes : load->most;
