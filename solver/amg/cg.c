@@ -77,6 +77,12 @@ static void take_step(void *ctx, int64_t begin, int64_t end)
     }
 }
 
+static void begin_direction(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    memcpy(u->cg->p + begin, u->cg->z + begin, (size_t)(end - begin) * sizeof *u->cg->p);
+}
+
 static void turn_direction(void *ctx, int64_t begin, int64_t end)
 {
     const update *u = ctx;
@@ -193,7 +199,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             !(info->last < 0.5 * before))
             return status;
         before = info->last;
-        memcpy(cg->p, cg->z, (size_t)n * sizeof *cg->p);
+        uz_by_pieces(begin_direction, &u, n);
         while (square > goal * goal && !uz_cg_should_stop(info, stop)) {
             look(&goal, info, stop, uz_root(square));
             if (info->ended || square <= goal * goal)

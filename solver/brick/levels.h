@@ -84,10 +84,11 @@ double uz_brick_curvature(const uz_brick_level *level, const uz_brick_vectors *v
 /* coarse->b = P't, 0 at its held dofs. */
 void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                        const uz_brick_vectors *coarse, const uz_brick_planes *room);
-/* x += P coarse->x at free dofs. */
+/* x = P coarse->x at free dofs, 0 at others. */
 void uz_brick_prolong(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
                       const uz_brick_vectors *coarse, const uz_brick_planes *room);
-/* The same of plane k, which begins at `plane`, its components so many numbers apart; inverse, coarse: of all. */
+/* x += P coarse at free dofs of plane k, which begins at `plane`, its components so many numbers apart; inverse,
+ * coarse: of all. */
 void uz_brick_prolong_plane(const uz_brick_level *level, const uz_brick_level *next, const float *inverse,
                             const float *coarse, float *line, int64_t k, float *plane, int64_t apart);
 

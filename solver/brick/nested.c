@@ -109,7 +109,6 @@ static void prolong_problem(const nested *x, int l, float *u, float *touches)
     float *const to[] = {u, touches}, *const of[] = {from->u, from->touches};
     for (int k = 0; k < 2; k++) {
         const uz_brick_vectors v = {.x = to[k], .inverse = x->mg->inverse[l]}, coarse = {.x = of[k]};
-        memset(to[k], 0, (size_t)uz_brick_numbers(level) * sizeof(float));
         uz_brick_prolong(level, level + 1, &v, &coarse, &x->room->planes);
     }
 }

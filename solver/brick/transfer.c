@@ -191,9 +191,12 @@ static void prolong_slab(void *ctx, int slab)
 {
     const transfer *t = ctx;
     const int64_t planes = t->f->cells[2] + 1, end = uz_brick_slab(planes, slab + 1, t->slabs);
-    for (int64_t k = uz_brick_slab(planes, slab, t->slabs); k < end; k++)
-        uz_brick_prolong_plane(t->f, t->c, t->v->inverse, t->coarse->x, t->room->of[slab].line, k,
-                               t->v->x + k * t->f->plane, t->f->size);
+    for (int64_t k = uz_brick_slab(planes, slab, t->slabs); k < end; k++) {
+        float *const x = t->v->x + k * t->f->plane;
+        for (int m = 0; m < 3; m++)
+            memset(x + m * t->f->size, 0, (size_t)t->f->plane * sizeof *x);
+        uz_brick_prolong_plane(t->f, t->c, t->v->inverse, t->coarse->x, t->room->of[slab].line, k, x, t->f->size);
+    }
 }
 
 void uz_brick_restrict(const uz_brick_level *level, const uz_brick_level *next, const uz_brick_vectors *v,
