@@ -140,9 +140,10 @@ static uz_status list_supports(balance *b, uz_error *err)
     return uz_csc_from_entries(&b->supports, b->scene->n_supports, mesh->n_nodes, &all, err);
 }
 
-static void find_wanted(balance *b)
+static void find_wanted(void *ctx, int64_t begin, int64_t end)
 {
-    for (int64_t a = 0; a < b->model->mesh.n_nodes; a++)
+    const balance *b = ctx;
+    for (int64_t a = begin; a < end; a++)
         b->wanted[a] = b->held[a] || uz_mesh_hangs(&b->model->mesh, a) || uz_is_tied(b->model, a);
 }
 
@@ -404,13 +405,24 @@ static void take_inner(balance *b, const double *inner)
     }
 }
 
-static uz_status energy_of(double *energy, const balance *b, uz_error *err)
+/* How many of these dofs supports move, or do not hold though they have no number. */
+static double count_carried(void *ctx, int64_t begin, int64_t end)
+{
+    const balance *b = ctx;
+    const uz_body_model *model = b->model;
+    int64_t count = 0;
+    for (int64_t i = begin; i < end; i++)
+        if (b->u[i] != 0)
+            count += (model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF) ||
+                     (model->n_rigid > 0 && uz_is_rigid(model, i / b->dim));
+    return (double)count;
+}
+
+static uz_status energy_of(double *energy, balance *b, uz_error *err)
 {
     /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
     const uz_body_model *model = b->model;
-    bool carried = model->n_modes > 0;
-    for (int64_t i = 0; i < model->mesh.n_nodes * b->dim && !carried; i++)
-        carried = ((model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF) || uz_is_rigid(model, i / b->dim)) && b->u[i] != 0;
+    const bool carried = model->n_modes > 0 || uz_sum_by_pieces(count_carried, b, model->mesh.n_nodes * b->dim) > 0;
     return uz_strain_energy(energy, model, b->u, carried, err);
 }
 
@@ -493,7 +505,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     if (status == UZ_OK)
         status = list_supports(&b, err);
     if (status == UZ_OK)
-        find_wanted(&b);
+        uz_by_pieces(find_wanted, &b, n);
     if (status == UZ_OK && known)
         take_inner(&b, known->inner);
     else if (status == UZ_OK)
