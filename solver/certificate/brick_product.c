@@ -31,7 +31,7 @@ typedef struct {
     const uz_brick *brick;
     int64_t stride, plane;
     const double *x;
-    double *hi, *lo;
+    double *hi, *lo, *y;            /* y: 0 at first */
     double size[DOFS], begin[DOFS]; /* of multiply */
     int slabs;
     planes of[UZ_ASIDE_MOST];
@@ -192,6 +192,7 @@ static void write_plane(const whole *w, const planes *p, int64_t k)
                     continue;
                 w->hi[dof[c]] = p->hi[0][at];
                 w->lo[dof[c]] = p->lo[0][at];
+                w->y[dof[c]] = 0.0;
             }
 }
 
@@ -285,11 +286,11 @@ uz_status uz_brick_precise_product(double *hi, double *lo, double *y, const uz_b
     w.x = x;
     w.hi = hi;
     w.lo = lo;
+    w.y = y;
     find_begins(&w);
     if (ok)
         uz_aside_share(multiply_slab, &w, w.slabs);
     clear(&w);
-    memset(y, 0, (size_t)brick->d * sizeof *y);
     if (ok && find_lines(some, brick, c))
         add_sparse(y, brick, c, some);
     free(some);

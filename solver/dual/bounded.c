@@ -85,7 +85,7 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error
     box->force = x->work2;
     box->point_energy = INFINITY;
     find_tightest(box, &x->load);
-    memcpy(box->u, x->base, (size_t)d * sizeof *box->u);
+    uz_long_copy(d, box->u, x->base);
     x->load.bytes += 8 * (size_t)((sized ? 2 : 1) * d + 6 * box->n + m) + (size_t)d;
     return UZ_OK;
 }

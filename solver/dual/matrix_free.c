@@ -143,7 +143,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
         return status;
     load->bytes += 16 * (size_t)d + x->cg.bytes;
     x->sparse.room = x->cg.room;
-    memcpy(x->sparse.p, p, (size_t)d * sizeof *p);
+    uz_long_copy(d, x->sparse.p, p);
     x->base_slack = INFINITY;
     /* Where coarser grids or an answer nearby tell which rows touch nothing needs a base until D is applied. */
     const bool told =
@@ -154,7 +154,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
         status = uz_sparse_load_end(&x->sparse, p, err);
     x->near = status == UZ_OK && told && load->near_u;
     if (x->near) {
-        memcpy(x->sparse.box->u, load->near_u, (size_t)d * sizeof *x->sparse.box->u);
+        uz_long_copy(d, x->sparse.box->u, load->near_u);
         memcpy(x->sparse.box->r, load->near_r, (size_t)load->dual->m * sizeof *x->sparse.box->r);
     }
     return status;
@@ -311,13 +311,37 @@ static uz_status sharpen(free_load *x, double *value, double *w, const double *e
     return status;
 }
 
+typedef struct {
+    const double *e, *w, *s;
+} remaining;
+
+static double find_product(void *ctx, int64_t begin, int64_t end)
+{
+    const remaining *x = ctx;
+    double sum = 0.0;
+    for (int64_t j = begin; j < end; j++)
+        sum += x->w[j] * (x->e[j] + x->s[j]);
+    return sum;
+}
+
 /* w'(e + s) + s'M^-1 s / lambda, where w has left `last`. */
 static double bound_by_cycle(const free_load *x, const double *e, const double *w, double last)
 {
-    double sum = 0.0;
-    for (int64_t j = 0; j < x->cg.n; j++)
-        sum += w[j] * (e[j] + x->cg.r[j]);
+    const double sum = uz_sum_by_pieces(find_product, &(remaining){e, w, x->cg.r}, x->cg.n);
     return (isnan(sum) ? INFINITY : fmax(0.0, sum)) + last * last / x->sparse.load.dual->amg->info.lambda;
+}
+
+/* A residual on its way into the range in which its squares are. */
+typedef struct {
+    double *e, *r;
+    double unit;
+} scaling;
+
+static void scale(void *ctx, int64_t begin, int64_t end)
+{
+    const scaling *x = ctx;
+    for (int64_t j = begin; j < end; j++)
+        x->r[j] = x->e[j] /= x->unit;
 }
 
 /* With w from conjugate gradients that begin at 0, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value:
@@ -338,8 +362,7 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
     const double largest = uz_long_max(n, e);
     /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
     const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
-    for (int64_t j = 0; j < n; j++)
-        x->cg.r[j] = e[j] /= unit;
+    uz_by_pieces(scale, &(scaling){e, x->cg.r, unit}, n);
     enough = enough / unit / unit;
     if (known->least > 0.0) { /* what sharpen would ask for, at once; lambda is a guess */
         stop.absolute = 0.5 * sqrt(UNSOLVED * enough * known->least);
@@ -448,12 +471,12 @@ static double goal_of(const free_load *x, double tolerance, double square)
            sqrt(x->sparse.load.dual->amg->info.lambda);
 }
 
-/* A long vector that another one goes to, as it is, or turned round: what is missing of equilibrium in cg->r is what is
- * left over in force. */
+/* A long vector that another one goes to, turned round: what is missing of equilibrium in cg->r is what is left over in
+ * force. */
 typedef struct {
     double *to;
     const double *from;
-} moving;
+} turning;
 
 /* K u in cg->r becomes p - K u. Returns u'K u. */
 static double leave_residual(void *ctx, int64_t begin, int64_t end)
@@ -471,15 +494,9 @@ static double leave_residual(void *ctx, int64_t begin, int64_t end)
     return sum;
 }
 
-static void copy(void *ctx, int64_t begin, int64_t end)
-{
-    const moving *x = ctx;
-    memcpy(x->to + begin, x->from + begin, (size_t)(end - begin) * sizeof *x->to);
-}
-
 static void negate(void *ctx, int64_t begin, int64_t end)
 {
-    const moving *x = ctx;
+    const turning *x = ctx;
     for (int64_t j = begin; j < end; j++)
         x->to[j] = -x->from[j];
 }
@@ -491,7 +508,7 @@ static double look(void *ctx)
     free_load *x = s->x;
     uz_bounded *box = x->sparse.box;
     box->largest = uz_long_max(x->cg.n, box->u);
-    uz_by_pieces(negate, &(moving){box->force, x->cg.r}, x->cg.n);
+    uz_by_pieces(negate, &(turning){box->force, x->cg.r}, x->cg.n);
     if (!looks_right(s))
         return INFINITY;
     return goal_of(x, s->least, uz_long_dot(x->cg.n, box->u, box->force) + uz_long_dot(x->cg.n, box->u, box->p));
@@ -542,7 +559,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         go_on = looks_right(&on_way) && roughly && info.met;
         tolerance = least;
         if (go_on)
-            uz_by_pieces(negate, &(moving){cg->r, box->force}, d);
+            uz_by_pieces(negate, &(turning){cg->r, box->force}, d);
     }
     memcpy(r, box->r, (size_t)m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
@@ -553,7 +570,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     if (status != UZ_OK)
         return status;
     if (may_bound(x, box->r)) { /* the forces on free dofs, and on held ones what no row bears */
-        uz_by_pieces(copy, &(moving){e, box->force}, d);
+        uz_long_copy(d, e, box->force);
         for (int64_t i = 0; i < m; i++)
             e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
         status = measure_slack(x, e, err);

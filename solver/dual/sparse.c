@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "law/sign.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
@@ -107,7 +108,7 @@ uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
     if (!x->p) {
         if (!(x->p = uz_alloc(dual->d, sizeof *x->p)))
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->d);
-        memcpy(x->p, p, (size_t)dual->d * sizeof *p);
+        uz_long_copy(dual->d, x->p, p);
         load->bytes += 8 * (size_t)dual->d;
     }
     return uz_bounded_create(x, bounds, err);
@@ -150,8 +151,7 @@ static double correction_energy(const uz_dual_load *load, const double *c, doubl
         any = c[j] != 0.0;
     if (any && !uz_sparse_has_entries(load->dual)) {
         uz_sparse_multiply(load, room, c);
-        for (int64_t j = 0; j < K->cols; j++)
-            square += c[j] * room[j];
+        square = uz_long_dot(K->cols, c, room);
     }
     for (int64_t j = 0; j < K->cols && any && uz_sparse_has_entries(load->dual); j++)
         for (int64_t k = K->ptr[j]; c[j] != 0.0 && k < K->ptr[j + 1]; k++)
@@ -222,7 +222,7 @@ uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool
     for (int64_t i = 0; guessed && i < load->dual->m; i++)
         guessed = r[i] == x->known_r[i];
     if (guessed) {
-        memcpy(u, x->known_u, (size_t)d * sizeof *u);
+        uz_long_copy(d, u, x->known_u);
     } else {
         status = load->dual->form->apply(load, x->work, r, err);
         for (int64_t j = 0; j < d; j++)

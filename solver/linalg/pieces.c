@@ -4,6 +4,7 @@
 #include "linalg/blas.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Numbers of a piece at least, some 5 microseconds; pieces of a sum at most. */
 enum { LEAST = 16384, PIECES_MOST = 512 };
@@ -36,6 +37,22 @@ static void divide(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx
 void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n)
 {
     divide(run, ctx, n, n / LEAST);
+}
+
+typedef struct {
+    double *to;
+    const double *from;
+} copying;
+
+static void copy(void *ctx, int64_t begin, int64_t end)
+{
+    const copying *x = ctx;
+    memcpy(x->to + begin, x->from + begin, (size_t)(end - begin) * sizeof *x->to);
+}
+
+void uz_long_copy(int64_t n, double *to, const double *from)
+{
+    uz_by_pieces(copy, &(copying){to, from}, n);
 }
 
 /* -------------------------------------------------------------------- columns */

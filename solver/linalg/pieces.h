@@ -15,6 +15,8 @@ void uz_by_pieces(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx,
 void uz_by_columns(void (*run)(void *ctx, int64_t begin, int64_t end), void *ctx, const uz_csc *A);
 /* The sum of of(ctx, begin, end) for ranges that make up 0..n. */
 double uz_sum_by_pieces(double (*of)(void *ctx, int64_t begin, int64_t end), void *ctx, int64_t n);
+/* to = from. */
+void uz_long_copy(int64_t n, double *to, const double *from);
 /* x'y. */
 double uz_long_dot(int64_t n, const double *x, const double *y);
 /* The same of single numbers, their products and sums in double precision. */
