@@ -6,6 +6,7 @@
 #include "certificate/residual.h"
 #include "certificate/double_double.h"
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/cpu.h"
 #include "core/error.h"
 
@@ -161,6 +162,50 @@ UZ_AVX2_FMA static void add_all_fused(sums *s, const double *const x[VECTORS], i
     add_all(s, x, d, 1);
 }
 
+/* Of how many dofs a part has the sums, at least, and how many parts there are at most: d alone decides. */
+enum { PART_LEAST = 65536, PARTS_MOST = 16 };
+
+/* The sums as the threads that share the dofs see them. */
+typedef struct {
+    const double *const *x;
+    int64_t d;
+    int parts;
+    sums of[PARTS_MOST];
+} adding;
+
+static void add_part(void *ctx, int part)
+{
+    adding *a = ctx;
+    const int64_t begin = a->d * part / a->parts, end = a->d * (part + 1) / a->parts;
+    const double *x[VECTORS];
+    for (int k = 0; k < VECTORS; k++)
+        x[k] = a->x[k] + begin;
+    memset(&a->of[part], 0, sizeof a->of[part]);
+    if (uz_cpu_has_avx2_fma())
+        add_all_fused(&a->of[part], x, end - begin);
+    else
+        add_all(&a->of[part], x, end - begin, 0);
+}
+
+static void add_sums(sums *s, const sums *more)
+{
+    const four sum = s->load + more->load, back = sum - s->load;
+    s->load_low += ((s->load - (sum - back)) + (more->load - back)) + more->load_low;
+    s->load = sum;
+    s->load_size += more->load_size;
+    s->stiffness += more->stiffness;
+    s->work += more->work;
+    s->work_size += more->work_size;
+    s->change += more->change;
+    s->change_size += more->change_size;
+    s->correction_energy += more->correction_energy;
+    s->weighted += more->weighted;
+    s->noise += more->noise;
+    const bits larger = more->largest > s->largest;
+    s->largest = (four)(((bits)more->largest & larger) | ((bits)s->largest & ~larger));
+    s->anything |= more->anything;
+}
+
 static double total(const four *x)
 {
     return ((*x)[0] + (*x)[1]) + ((*x)[2] + (*x)[3]);
@@ -172,12 +217,12 @@ static void add_up(certifier *c, uz_bound_terms *t)
     const uz_residuals *res = &c->res;
     uz_energy_sums *energies = &c->sums;
     const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
-    sums s;
-    memset(&s, 0, sizeof s);
-    if (uz_cpu_has_avx2_fma())
-        add_all_fused(&s, x, c->d);
-    else
-        add_all(&s, x, c->d, 0);
+    const int64_t parts = c->d / PART_LEAST;
+    adding all = {.x = x, .d = c->d, .parts = parts < 1 ? 1 : parts < PARTS_MOST ? (int)parts : PARTS_MOST};
+    uz_aside_share(add_part, &all, all.parts);
+    sums s = all.of[0];
+    for (int part = 1; part < all.parts; part++)
+        add_sums(&s, &all.of[part]);
     double_double load = {0.0, total(&s.load_low)};
     for (int l = 0; l < 4; l++)
         dd_add(&load, s.load[l]);
