@@ -69,6 +69,8 @@ typedef struct {
                        uz_error *err);
     /* y = K x in double precision; y and x do not overlap. */
     void (*multiply)(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x);
+    /* The same; returns x'y. NULL: it is as fast to look at both again. */
+    double (*curve)(const uz_multigrid *mg, uz_multigrid_room *room, double *y, const double *x);
     /* x += K_FF^-1 r as conjugate gradients in single precision know it, r (n) what they have left: for residuals that
      * are looked at afterwards. *info: `met` false where single precision may not reach the tolerance, x is then as far
      * as it came (iterations 0: as it was, and r too). NULL: there is none. */

@@ -77,10 +77,18 @@ static void take_step(void *ctx, int64_t begin, int64_t end)
     }
 }
 
-static void begin_direction(void *ctx, int64_t begin, int64_t end)
+/* cg->z = K cg->p; returns p'z. told: as uz_cg_solve has it. */
+static double find_curvature(uz_cg *cg, const uz_csc *K, bool told)
 {
-    const update *u = ctx;
-    memcpy(u->cg->p + begin, u->cg->z + begin, (size_t)(end - begin) * sizeof *u->cg->p);
+    const uz_multigrid_kind *kind = cg->mg->kind;
+    double curvature = 0.0;
+    if (kind->curve)
+        curvature = kind->curve(cg->mg, cg->room, cg->z, cg->p);
+    else
+        kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
+    if (!told)
+        clear_held(cg->z, cg);
+    return kind->curve ? curvature : uz_long_dot(cg->n, cg->p, cg->z);
 }
 
 static void turn_direction(void *ctx, int64_t begin, int64_t end)
@@ -199,15 +207,12 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             !(info->last < 0.5 * before))
             return status;
         before = info->last;
-        uz_by_pieces(begin_direction, &u, n);
+        uz_long_copy(n, cg->p, cg->z);
         while (square > goal * goal && !uz_cg_should_stop(info, stop)) {
             look(&goal, info, stop, uz_root(square));
             if (info->ended || square <= goal * goal)
                 break;
-            cg->mg->kind->multiply(cg->mg, K, cg->room, cg->z, cg->p);
-            if (!told)
-                clear_held(cg->z, cg);
-            const double curvature = uz_long_dot(n, cg->p, cg->z), alpha = square / curvature, last = square;
+            const double curvature = find_curvature(cg, K, told), alpha = square / curvature, last = square;
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
                 break;
             if (!(curvature > 0.0))

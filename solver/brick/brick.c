@@ -140,7 +140,7 @@ bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick)
     room->plane = room->stride * (brick->cells[1] + 1);
     room->most = uz_aside_count();
     const int64_t n = 3 * room->plane + 2 * UZ_BRICK_PAD;
-    bool ok = true;
+    bool ok = (room->of_plane = uz_alloc_zero(brick->cells[2] + 1, sizeof(double)));
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_product_room *of = &room->of[part];
         for (int k = 0; k < 2; k++) {
@@ -163,6 +163,7 @@ void uz_brick_product_clear(uz_brick_product *room)
         }
         free(room->of[part].sums);
     }
+    free(room->of_plane);
     memset(room, 0, sizeof *room);
 }
 
@@ -173,6 +174,7 @@ typedef struct {
     const double *block, *x, *value;
     uz_brick_product *room;
     int slabs;
+    bool sums; /* x'y is wanted */
     void (*layer)(const uz_brick_product *, struct uz_brick_product_room *, const uz_brick *, const double *);
 } product;
 
@@ -271,6 +273,17 @@ static void layer_narrow(const uz_brick_product *room, struct uz_brick_product_r
     layer(room, of, brick, block);
 }
 
+/* What a plane adds to x'y, which is 0 at dofs that are supported. */
+static double along_plane(const struct uz_brick_product_room *of, int64_t n)
+{
+    lanes sum[2] = {{0.0}};
+    for (int64_t i = 0; i < n; i += 2 * WIDTH)
+        for (int s = 0; s < 2; s++)
+            sum[s] += *(const lanes *)(of->in[0] + i + WIDTH * s) * *(const lanes *)(of->out[0] + i + WIDTH * s);
+    const lanes all = sum[0] + sum[1];
+    return (all[0] + all[1]) + (all[2] + all[3]);
+}
+
 /* The next plane becomes the present one. */
 static void go_up(struct uz_brick_product_room *of)
 {
@@ -297,23 +310,33 @@ static void multiply_slab(void *ctx, int slab)
         }
         if (k >= first)
             pack(p, k, of->out[0]);
+        if (k >= first && p->sums)
+            p->room->of_plane[k] = along_plane(of, 3 * p->room->plane);
         go_up(of);
     }
+}
+
+static void share(product *p)
+{
+    const int64_t planes = p->brick->cells[2] + 1;
+    p->slabs = uz_brick_slabs(planes, planes * p->room->plane, p->room->most);
+    p->layer = uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow;
+    uz_aside_share(multiply_slab, p, p->slabs);
 }
 
 void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x,
                        const double *value)
 {
-    const int64_t planes = brick->cells[2] + 1;
-    product p = {y,
-                 brick,
-                 block,
-                 x,
-                 value,
-                 room,
-                 uz_brick_slabs(planes, planes * room->plane, room->most),
-                 uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow};
-    uz_aside_share(multiply_slab, &p, p.slabs);
+    share(&(product){.y = y, .brick = brick, .block = block, .x = x, .value = value, .room = room});
+}
+
+double uz_brick_curve(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x)
+{
+    double sum = 0.0;
+    share(&(product){.y = y, .brick = brick, .block = block, .x = x, .room = room, .sums = true});
+    for (int64_t k = 0; k <= brick->cells[2]; k++)
+        sum += room->of_plane[k];
+    return sum;
 }
 
 uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double *value, uz_error *err)

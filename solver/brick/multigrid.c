@@ -432,6 +432,12 @@ static void multiply(const uz_multigrid *base, const uz_csc *K, uz_multigrid_roo
     uz_brick_multiply(y, mg->brick, mg->block, &room->product, x, NULL);
 }
 
+static double curve(const uz_multigrid *base, uz_multigrid_room *room, double *y, const double *x)
+{
+    const uz_brick_grids *mg = (const uz_brick_grids *)base;
+    return uz_brick_curve(y, mg->brick, mg->block, &room->product, x);
+}
+
 /* -------------------------------------------------------------- the room */
 
 static void free_room(uz_multigrid_room *room)
@@ -459,7 +465,7 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
         return NULL;
     *bytes = sizeof *room;
     bool ok = uz_brick_product_init(&room->product, mg->brick);
-    *bytes += 96 * (size_t)(room->product.plane * room->product.most);
+    *bytes += 96 * (size_t)(room->product.plane * room->product.most) + 8 * (size_t)(mg->brick->cells[2] + 1);
     room->levels = base->levels;
     for (int l = 0; l < base->levels; l++) {
         uz_brick_vectors *v = &room->v[l];
@@ -528,6 +534,7 @@ static void free_multigrid(uz_multigrid *base)
 
 static const uz_multigrid_kind KIND = {.apply = apply,
                                        .multiply = multiply,
+                                       .curve = curve,
                                        .step_roughly = uz_brick_step_roughly,
                                        .room = make_room,
                                        .free_room = free_room,

@@ -33,6 +33,7 @@ static inline int64_t uz_brick_slab(int64_t planes, int slab, int slabs)
 typedef struct {
     int64_t stride, plane; /* numbers in a line and in a plane of nodes, of one component */
     int most;
+    double *of_plane; /* what each adds to x'y */
     struct uz_brick_product_room {
         double *in[2], *out[2], *sums;
     } of[UZ_ASIDE_MOST];
@@ -42,5 +43,7 @@ void uz_brick_product_clear(uz_brick_product *room);
 /* y (d) = K x, with block of uz_brick_blocks, unit 1; supported dofs are moved by `value`, or NULL: not. x NULL: 0. */
 void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x,
                        const double *value);
+/* y = K x, likewise. Returns x'y. */
+double uz_brick_curve(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x);
 
 #endif
