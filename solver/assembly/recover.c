@@ -3,22 +3,36 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
+/* Displacements by node as the threads that share them see them. */
+typedef struct {
+    double *nodal;
+    const int64_t *of;
+    const double *u, *prescribed;
+} recovering;
+
+static void take_dofs(void *ctx, int64_t begin, int64_t end)
+{
+    const recovering *x = ctx;
+    for (int64_t i = begin; i < end; i++) {
+        const int64_t dof = x->of[i];
+        if (dof >= 0)
+            x->nodal[i] = x->u[dof];
+        else
+            x->nodal[i] = x->prescribed && dof != UZ_NO_DOF ? x->prescribed[-1 - dof] : 0;
+    }
+}
+
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed)
 {
     const int dim = model->mesh.dim;
     const int64_t total = model->mesh.n_nodes * dim;
-    for (int64_t i = 0; i < total; i++) {
-        const int64_t dof = model->dof[i];
-        if (dof >= 0)
-            nodal[i] = u[dof];
-        else
-            nodal[i] = prescribed && dof != UZ_NO_DOF ? prescribed[-1 - dof] : 0;
-    }
+    uz_by_pieces(take_dofs, &(recovering){nodal, model->dof, u, prescribed}, total);
     for (int64_t i = 0; i < model->info.n_rotated; i++)
         uz_from_frame(nodal + model->info.rotated_node[i] * dim, model, model->info.rotated_node[i]);
     for (int64_t a = 0; a < model->mesh.n_nodes && model->follow.first; a++) {
