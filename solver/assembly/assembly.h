@@ -303,13 +303,27 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * INFINITY where energies are beyond the range of double. Zienkiewicz and Zhu, "A simple error estimator and adaptive
  * procedure for practical engineering analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared
  * with its own nodal averages. The strain of the temperatures among the scene's loads (scene NULL: none) has no stress,
- * and the error is relative to the norm of the strain that has: free expansion would hide it. *share (may be NULL):
- * that norm over ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. eta2
+ * and the error is relative to the norm of the strain that has: free expansion would hide it. Both norms have what
+ * springs store, and the error what they do at nodes other than along sides. *share (may be NULL): that norm over
+ * ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. eta2
  * (n_elements, NULL: not wanted): what each element has of the square of the error, not relative; all 0 where the error
  * is. With a scene, thin stacks of elements with incompatible modes from one known load to another one are off by no
  * less than the mean stress between both differs by from them (thin_elements.h). */
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal);
+
+/* What springs at nodes, as the mesh has them, do on u along z (n_nodes x dim each), less what those do that are spread
+ * evenly over the sides of their groups. part (n_elements, NULL: not wanted): each element's is added. */
+double uz_spring_excess(double *part, const uz_body_model *model, const uz_scene *scene, const double *u,
+                        const double *z);
+/* The square of the error, in the energy norm, that springs at nodes make at least: with a_h for a with those, the
+ * error e has a(e, v) = (a_h - a)(u, v), so that |e| >= (a_h - a)(u, v) / |v| for all v that may be moved along; v is
+ * the displacement u (n_nodes x dim) less the translation that the springs have in the mean, where that is free. A
+ * rigid body that rocks is off by just as much. strain: twice the energy that u has in the elements; *stored: in the
+ * springs. scene NULL: only that. eta2 (n_elements, NULL: not wanted): what each element has is added. NaN: no memory.
+ */
+double uz_spring_error(double *eta2, double *stored, const uz_body_model *model, const uz_scene *scene, const double *u,
+                       double strain);
 
 /* *energy: the same estimate of ||u - u_h||_E^2, not relative to anything, less what quadratic triangles and tetrahedra
  * are taken to hide. eta2 (n_elements, NULL: not wanted): what each element has of it. free_strain: as of

@@ -329,6 +329,12 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
     uz_free_all(least, own, free_strain);
     if (status != UZ_OK)
         return NAN;
+    double stored;
+    sums.eta2 += uz_spring_error(eta2, &stored, model, scene, nodal, sums.whole);
+    sums.whole += stored;
+    sums.stress += stored;
+    if (isnan(sums.eta2))
+        return NAN;
     if (!(sums.whole > 0 && isfinite(sums.whole)))
         return INFINITY;
     const double stressed = sqrt(sums.stress / sums.whole);

@@ -5,10 +5,14 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/blas.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Springs at the nodes of linear sides are at most three times as stiff as those along them are. */
+#define BOUND 2
 
 /* w: what each node has of a side's area (positive: of springs), or of an element's volume; returns how many nodes
  * there are. */
@@ -96,4 +100,107 @@ uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_erro
     }
     free(share);
     return status;
+}
+
+/* k u along z at a place amid these nodes, with their shape functions there. */
+static double product(const double *k, const double *u, const double *z, int dim, const int64_t *node, const double *N,
+                      int nodes)
+{
+    double sum = 0;
+    for (int c = 0; c < dim; c++) {
+        double here = 0, along = 0;
+        for (int a = 0; a < nodes; a++) {
+            here += N[a] * u[node[a] * dim + c];
+            along += N[a] * z[node[a] * dim + c];
+        }
+        sum += k[c] * here * along;
+    }
+    return sum;
+}
+
+static double excess_of_group(double *part, const uz_body_model *model, const uz_group *group, const double *k,
+                              const double *u, const double *z)
+{
+    static const double ONE = 1;
+    const int dim = model->mesh.dim;
+    double sum = 0, area = 0;
+    for (int pass = 0; pass < 2; pass++) /* the area first: all of it has k */
+        for (int64_t f = 0; f < group->n_faces; f++) {
+            double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES], weight[UZ_FACE_NODES], n[3] = {0}, point[2], own = 0;
+            int64_t node[UZ_FACE_NODES];
+            uz_side side;
+            uz_body_side(&side, xyz, node, model, group->face[f]);
+            uz_side_positive_weights(weight, &side);
+            for (int a = 0; a < side.nodes && pass == 0; a++)
+                area += weight[a];
+            for (int a = 0; a < side.nodes && pass == 1; a++)
+                own += weight[a] * product(k, u, z, dim, node + a, &ONE, 1);
+            for (int g = 0; g < uz_side_gauss_count(&side) && pass == 1; g++) {
+                const double of = uz_side_gauss(point, &side, g);
+                uz_side_shape(N, &side, point);
+                uz_side_area_vector(n, &side, point);
+                own -= of * uz_norm(3, n) * product(k, u, z, dim, node, N, side.nodes);
+            }
+            if (pass == 1 && part)
+                part[group->face[f].element] += own / area;
+            sum += pass == 1 ? own / area : 0;
+        }
+    return sum;
+}
+
+double uz_spring_excess(double *part, const uz_body_model *model, const uz_scene *scene, const double *u,
+                        const double *z)
+{
+    double sum = 0;
+    for (int64_t k = 0; k < scene->n_supports && model->spring; k++) {
+        const uz_support *support = &scene->supports[k];
+        const bool spring = support->kind == UZ_SUPPORT_SPRING;
+        const uz_group *group = spring ? uz_mesh_group(&model->mesh, support->on, "", NULL) : NULL;
+        if (group && group->kind == UZ_GROUP_FACES)
+            sum += excess_of_group(part, model, group, support->spring, u, z);
+    }
+    return sum;
+}
+
+/* May it be translated along an axis, as far as is known without its rows? */
+static bool is_free_along(const uz_body_model *model, int c)
+{
+    const int dim = model->mesh.dim;
+    bool is_free = model->m == 0 && (c > 0 || model->kind != UZ_AXISYMMETRIC);
+    for (int64_t a = 0; a < model->mesh.n_nodes && is_free; a++)
+        is_free = (model->dof[a * dim + c] >= 0 || model->dof[a * dim + c] == UZ_NO_DOF) && !uz_node_frame(model, a) &&
+                  !uz_is_rigid(model, a);
+    return is_free;
+}
+
+double uz_spring_error(double *eta2, double *stored, const uz_body_model *model, const uz_scene *scene, const double *u,
+                       double strain)
+{
+    const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
+    double square = strain, positive = 0;
+    *stored = 0;
+    if (!model->spring)
+        return 0;
+    for (int64_t c = 0; c < dim; c++) {
+        double k = 0, ku = 0, kuu = 0;
+        for (int64_t a = 0; a < n; a++) {
+            const double own = model->spring[a * dim + c], way = u[a * dim + c];
+            k += own;
+            ku += own * way;
+            kuu += own * way * way;
+        }
+        *stored += kuu;
+        square += k > 0 && is_free_along(model, (int)c) ? fmax(0, kuu - ku * ku / k) : kuu;
+    }
+    double *part = scene && eta2 ? uz_alloc_zero(model->mesh.n_elements, sizeof *part) : NULL;
+    if (scene && eta2 && !part)
+        return NAN;
+    const double excess = scene ? uz_spring_excess(part, model, scene, u, u) : 0, rest = square - excess;
+    const double error = rest > 0 ? fmin(excess * excess / rest, BOUND * fabs(excess)) : 0;
+    for (int64_t e = 0; e < model->mesh.n_elements && part; e++)
+        positive += fmax(0, part[e]);
+    for (int64_t e = 0; e < model->mesh.n_elements && positive > 0; e++)
+        eta2[e] += error * fmax(0, part[e]) / positive;
+    free(part);
+    return error;
 }

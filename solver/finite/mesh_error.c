@@ -145,8 +145,8 @@ static void compare(void *ctx, const uz_strain_group *group)
     }
 }
 
-uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
-                               const double *u, uz_error *err)
+uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const uz_scene *scene,
+                               const double *free_strain, const double *u, uz_error *err)
 {
     comparison x = {.model = model, .own = 1, .whole = true, .eta2_of = eta2};
     const uz_strain_source from = {
@@ -157,6 +157,11 @@ uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model 
     if (status == UZ_OK)
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     uz_nodal_strains_clear(&x.nodal);
+    double stored;
+    x.eta2 += uz_spring_error(eta2, &stored, model, scene, u, 2 * x.energy);
+    if (status == UZ_OK && isnan(x.eta2))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to look at what springs do");
+    x.energy += 0.5 * stored;
     const double square = 2 * x.energy + x.eta2;
     const bool told = status == UZ_OK && !x.failed, rests = x.energy == 0 && x.eta2 == 0;
     *error = told && rests ? 0 : told && square > ROUNDING * ROUNDING * x.unit ? sqrt(x.eta2 / square) : (double)NAN;

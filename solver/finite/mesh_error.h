@@ -5,12 +5,12 @@
 #include "assembly/assembly.h"
 
 /* *error: about ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim)
- * of an equilibrium in the standard formulation; free_strain: n_elements, of the temperature, NULL: none. What
- * uz_estimate_mesh_error is of small deformation, which it becomes. eta2: n_elements, what each has of the square of
- * the error, an energy; NULL: not wanted. 0 of a body that nothing strains; NaN where the law has no energy somewhere,
- * or strains are rounding. UZ_ERR_MEMORY: *error is NaN, too. */
-uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const double *free_strain,
-                               const double *u, uz_error *err);
+ * of an equilibrium of the scene in the standard formulation; free_strain: n_elements, of the temperature, NULL: none.
+ * What uz_estimate_mesh_error is of small deformation, which it becomes. eta2: n_elements, what each has of the square
+ * of the error, an energy; NULL: not wanted. 0 of a body that nothing strains; NaN where the law has no energy
+ * somewhere, or strains are rounding. UZ_ERR_MEMORY: *error is NaN, too. */
+uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const uz_scene *scene,
+                               const double *free_strain, const double *u, uz_error *err);
 
 /* *energy: the same estimate's eta^2 of own E(u) + times dE(u; z), dE the derivative of the strain along z (n_nodes x
  * dim), in the moduli at u, less what it is taken to hide: what uz_mesh_error_energy is of small strain, and likewise

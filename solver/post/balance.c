@@ -527,6 +527,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         energy = known->energy;
     else if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the body */
         status = energy_of(&energy, &b, err);
+    for (int64_t i = 0; i < n * dim && model->spring; i++)
+        out->spring_energy += 0.5 * model->spring[i] * u[i] * u[i];
     out->strain_energy = energy - expanding + expanded;
     out->potential_energy = energy - work + expanded;
     out->imbalance = imbalance(&b);

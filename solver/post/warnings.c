@@ -616,16 +616,23 @@ static void warn_of_mesh(uz_evaluation *out, double mesh_error, const char *text
     out->n_warnings = at < n ? n : out->n_warnings;
 }
 
+/* What is stored beside springs, in parts of the whole, that is told from rounding. */
+static const double LEAST_STORED = 1e-14;
+
+/* Soft springs store so much that a stress of which nothing is right is a small part of all. */
 void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
 {
     char text[sizeof out->warnings[0].message];
-    if (!(mesh_error >= COARSE_MESH) || !isfinite(mesh_error))
+    const double stored = out->spring_energy / out->strain_energy;
+    const double square = mesh_error * mesh_error, own = fmax(0, 1 - square) * fmax(0, 1 - stored),
+                 error = stored > 0 ? sqrt(square / (own + square)) : mesh_error;
+    if (!(error >= COARSE_MESH) || !isfinite(error) || own + square < LEAST_STORED)
         return;
     snprintf(text, sizeof text,
-             "the mesh itself is off by about %.2g %% in the energy norm: refine it, above all near contacts and "
+             "the mesh itself is off by about %.2g %% in the energy norm%s: refine it, above all near contacts and "
              "corners",
-             100 * mesh_error);
-    warn_of_mesh(out, mesh_error, text);
+             100 * error, stored > 0 ? ", without what springs store" : "");
+    warn_of_mesh(out, error, text);
 }
 
 void uz_doubt_unborne(uz_evaluation *out)

@@ -504,8 +504,9 @@ static uz_status solve_large(uz_result **results, const search *g, const uz_prob
                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; i < g->n_cases && status == UZ_OK; i++) { /* on one mesh an answer stays without its estimate */
         double *error = &results[i]->summary.discretization_error;
+        const uz_scene one = uz_scene_of_case(problem, i);
         if (results[i]->summary.finite.load > 0 && isnan(*error))
-            status = uz_finite_mesh_error(error, NULL, body, results[i]->free_strain, results[i]->u, err);
+            status = uz_finite_mesh_error(error, NULL, body, &one, results[i]->free_strain, results[i]->u, err);
     }
     for (int64_t i = 0; near && i < g->n_cases; i++)
         free(near[i]);

@@ -108,7 +108,8 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         const bool large = results[i]->summary.geometry.kind == UZ_KINEMATICS_FINITE;
         double error = large ? (double)NAN : uz_estimate_mesh_error(eta2, NULL, body, &scene, results[i]->u);
         if (large)
-            done = uz_finite_mesh_error(&error, eta2, body, results[i]->free_strain, results[i]->u, NULL) == UZ_OK;
+            done =
+                uz_finite_mesh_error(&error, eta2, body, &scene, results[i]->free_strain, results[i]->u, NULL) == UZ_OK;
         else
             done = !isnan(error);
         for (int64_t e = 0; e < n_elements; e++)

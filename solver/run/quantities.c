@@ -294,63 +294,14 @@ static double depth_shift(const adjoint *x, const uz_functional *of, const doubl
     return of->times * sum;
 }
 
-/* k u along z at a place amid these nodes, with their shape functions there. */
-static double spring_product(const adjoint *x, const double *k, const int64_t *node, const double *N, int nodes)
-{
-    const int dim = x->work->model->mesh.dim;
-    const double own = x->work->place ? x->own : 0;
-    double sum = 0;
-    for (int c = 0; c < dim; c++) {
-        double u = 0, z = 0;
-        for (int a = 0; a < nodes; a++) {
-            u += N[a] * x->answer->u[node[a] * dim + c];
-            z += N[a] * x->z[node[a] * dim + c];
-        }
-        sum += k[c] * u * (z + own * u);
-    }
-    return sum;
-}
-
-/* What springs at nodes, by the parts that these have of a group's area, do on u along z, less what the same do that
- * are spread evenly over its sides. */
-static double spring_difference(const adjoint *x, const uz_group *group, const double *k)
-{
-    static const double ONE = 1;
-    double at_nodes = 0, evenly = 0, weights = 0, area = 0;
-    for (int64_t f = 0; f < group->n_faces; f++) {
-        double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES], weight[UZ_FACE_NODES], n[3] = {0}, point[2];
-        int64_t node[UZ_FACE_NODES];
-        uz_side side;
-        uz_body_side(&side, xyz, node, x->work->model, group->face[f]);
-        uz_side_positive_weights(weight, &side);
-        for (int a = 0; a < side.nodes; a++) {
-            weights += weight[a];
-            at_nodes += weight[a] * spring_product(x, k, node + a, &ONE, 1);
-        }
-        for (int g = 0; g < uz_side_gauss_count(&side); g++) {
-            const double part = uz_side_gauss(point, &side, g);
-            uz_side_shape(N, &side, point);
-            uz_side_area_vector(n, &side, point);
-            area += part * uz_norm(3, n);
-            evenly += part * uz_norm(3, n) * spring_product(x, k, node, N, side.nodes);
-        }
-    }
-    return area > 0 ? at_nodes / weights - evenly / area : 0;
-}
-
 /* Where a body turns on its springs those at the ends of sides hold it too well. With a_h for a with springs at nodes,
  * l(u) - l(u_h) has f(z_h) - a(u_h, z_h) = (a_h - a)(u_h, z_h) besides a(e_u, e_z). */
 static double spring_shift(const adjoint *x)
 {
-    double sum = 0;
-    for (int64_t k = 0; k < x->work->scene->n_supports; k++) {
-        const uz_support *support = &x->work->scene->supports[k];
-        const bool spring = support->kind == UZ_SUPPORT_SPRING;
-        const uz_group *group = spring ? uz_mesh_group(&x->work->model->mesh, support->on, "", NULL) : NULL;
-        if (group && group->kind == UZ_GROUP_FACES)
-            sum += spring_difference(x, group, support->spring);
-    }
-    return sum;
+    const uz_body_model *model = x->work->model;
+    const double *u = x->answer->u, own = x->work->place ? x->own : 0;
+    const double along = uz_spring_excess(NULL, model, x->work->scene, u, x->z);
+    return own != 0 ? along + own * uz_spring_excess(NULL, model, x->work->scene, u, u) : along;
 }
 
 /* What the end of a contact amid a side leaves open: of each side with rows that press and others that do not, what it

@@ -232,6 +232,30 @@ def test_springs_along_a_thin_strip_hide_nothing(s):
                 check(quantity["low"] < fine[stiffness][2]["on_this_mesh"] < quantity["high"], load, stiffness, cells, quantity, fine)
 
 
+def test_what_springs_store_is_of_the_norm(s):
+    """It was not, and soft springs made the error up to a thousand times as large, but no warning of a stress of which little is right goes. A
+    block that rocks on springs at the ends of n linear sides is held 1 + 2 / n^2 times as well as along them, whatever its own stress."""
+    def told(element, cells, spring, young, on, loads, formulation="auto", held=(), **more):
+        return solved(s, {"problem": {
+            "kind": "scene", "model": "plane_stress", "kinematics": "fixed", "formulation": formulation, "materials": [{"on": "all", "young": young, "poisson": 0.3}],
+            "mesh": {"box": {"size": more.get("size", [2, 1]), "cells": cells, "element": element}}, "loads": loads,
+            "supports": [{"on": on, "spring": spring}, *held]}})["summary"]
+    for n in (1, 2, 4, 8, 10):
+        summary, true = told("quad4", [n, max(1, n // 2)], [10, 1], 1e5, "bottom", [{"on": "left", "traction": [0, 1]}, {"on": "right", "traction": [0, -1.2]}]), 2 / (n * n + 2)
+        # of springs across, which the block is translated along, too, nothing is off
+        rocking = 1 - 0.2 ** 2 / (0.2 ** 2 + 2.2 ** 2 / (1 / 3 * (1 + 2 / n ** 2)))
+        check(0.9 * true * math.sqrt(rocking) < summary["error"]["mesh"] < 1.35 * true, n, summary["error"], true, rocking)
+    soft = ("quad8", [1, 1], [0.02, 2], 1000, "right", [{"on": "top", "traction": [0.3, -0.8]}, {"on": "left", "traction": [0.5, 0.2]}])
+    strip = ("tri3", [6, 1], [0, 0.15], 1000, "top", [{"on": "right", "traction": [0.2, 0.7]}, {"on": "left", "traction": [0, -0.4]}], "auto", [{"on": "left", "ux": 0}])
+    thick = ("tri6", [2, 2], [0.5, 0.5], 1000, "top", [{"on": "right", "traction": [0.6, 0.4]}, {"on": "top", "traction": [0.6, 0.9]}], "auto", [{"on": "left", "ux": 0}])
+    for scene, size in ((soft, [1, 1]), (strip, [6, 1]), (thick, [2, 1])):
+        coarse, fine = told(*scene, size=size), told("quad8", [16 * k for k in size], *scene[2:], size=size)
+        lost = coarse["energy"]["potential"] - fine["energy"]["potential"]
+        true, own = math.sqrt(max(0, lost) / coarse["energy"]["strain"]), fine["error"]["mesh"]
+        check(0.7 * true - own < coarse["error"]["mesh"] < 1.5 * true + own, scene, coarse["error"], true, own)
+    check([w["code"] for w in told(*strip, size=[6, 1])["warnings"] if w["code"] == "coarse_mesh"], "a strip of six pairs of triangles has no stress to believe")
+
+
 def check_told(s, scene, mesh, finer, low=0.6, high=1.7):
     """Of a mesh of a few elements: told over true error, by the energy of a finer mesh, whose quantities are in its intervals."""
     found = [solved(s, {"problem": {"kind": "scene", "kinematics": "fixed", **scene, "mesh": one},

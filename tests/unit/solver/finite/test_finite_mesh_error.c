@@ -15,7 +15,7 @@ static const uz_model PLANE[] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETR
 static double error_of(const uz_body_model *model, const double *free_strain, const double *u)
 {
     double error;
-    CHECK_INT(uz_finite_mesh_error(&error, NULL, model, free_strain, u, NULL), UZ_OK);
+    CHECK_INT(uz_finite_mesh_error(&error, NULL, model, NULL, free_strain, u, NULL), UZ_OK);
     return error;
 }
 
@@ -139,7 +139,7 @@ TEST(elements_have_their_parts)
             const double x = model.mesh.xyz[i] - 1;
             u[i] = 0.1 * x + (x > 4 ? 0.3 * (x - 4) * (x - 4) : 0);
         }
-        CHECK_INT(uz_finite_mesh_error(&error, eta2, &model, NULL, u, NULL), UZ_OK);
+        CHECK_INT(uz_finite_mesh_error(&error, eta2, &model, NULL, NULL, u, NULL), UZ_OK);
         for (int64_t e = 0; e < model.mesh.n_elements; e++) {
             int count;
             const int64_t *node = uz_mesh_element(&model.mesh, e, &count);
