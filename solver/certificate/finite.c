@@ -23,6 +23,8 @@
 
 /* Points of each side, between its ends, at which gaps are looked at. */
 enum { SAMPLES = 7 }; /* in space along both of its directions */
+/* Looks around the closest of them, each as far or half as far as the one before. */
+enum { CLOSER = 10 };
 
 /* Steps to the stretch across a plane. */
 enum { MOST_HALVINGS = 200 };
@@ -429,18 +431,36 @@ static uz_status add_along(work *w, double factor, double most, uz_error *err)
     return status;
 }
 
-/* One side: its ends and points between them. */
-static uz_status look_at_side(uz_finite_certificate *out, const uz_finite_answer *of, uz_face face,
+/* The gap of a point of a side whose nodes have gone to xyz. */
+static uz_status gap_at(double *gap, const uz_side *side, const double *xyz, const uz_obstacle *obstacle,
+                        const double point[2], uz_error *err)
+{
+    double N[UZ_FACE_NODES], x[3] = {0};
+    uz_gap at;
+    uz_side_shape(N, side, point);
+    for (int a = 0; a < side->nodes; a++)
+        for (int c = 0; c < side->dim; c++)
+            x[c] += N[a] * xyz[side->dim * a + c];
+    const uz_status status = uz_obstacle_gap(&at, obstacle, x, err);
+    *gap = at.gap;
+    return status;
+}
+
+/* One side: its ends and points between them, and from the closest of these on to where it is closest: an obstacle
+ * that is narrower than the points are apart may be deep between them. apart: of nodes, how far the closest of the
+ * sides around each is from the obstacle, over the length of that side. */
+static uz_status look_at_side(uz_finite_certificate *out, double *apart, const uz_finite_answer *of, uz_face face,
                               const uz_obstacle *obstacle, uz_error *err)
 {
     enum { STEPS = SAMPLES + 1 };
     uz_side side;
-    double xyz[3 * UZ_FACE_NODES], N[UZ_FACE_NODES], length = 0;
+    double xyz[3 * UZ_FACE_NODES], length = 0, least = INFINITY, gap, at[2] = {0};
     int64_t node[UZ_FACE_NODES];
     uz_status status = UZ_OK;
     uz_body_side(&side, xyz, node, of->model, face);
     const int dim = side.dim;
     const bool triangle = dim == 3 && side.nodes % 3 == 0;
+    const double first = triangle ? 0 : -1, step = (triangle ? 1.0 : 2.0) / STEPS;
     for (int a = 0; a < side.nodes; a++) {
         for (int c = 0; c < dim; c++)
             xyz[dim * a + c] += of->u[dim * node[a] + c];
@@ -449,21 +469,49 @@ static uz_status look_at_side(uz_finite_certificate *out, const uz_finite_answer
     }
     for (int k = 0; k <= STEPS; k++)
         for (int l = 0; l <= (dim == 2 ? 0 : triangle ? STEPS - k : STEPS) && status == UZ_OK; l++) {
-            const double first = triangle ? 0 : -1, step = (triangle ? 1.0 : 2.0) / STEPS;
             const double point[2] = {first + step * k, first + step * l};
-            double x[3] = {0};
-            uz_gap at;
-            uz_side_shape(N, &side, point);
-            for (int a = 0; a < side.nodes; a++)
-                for (int c = 0; c < dim; c++)
-                    x[c] += N[a] * xyz[dim * a + c];
-            status = uz_obstacle_gap(&at, obstacle, x, err);
-            if (status != UZ_OK)
-                continue;
-            out->least_gap = fmin(out->least_gap, at.gap);
-            out->least_part = fmin(out->least_part, length > 0 ? at.gap / length : -(double)INFINITY);
+            status = gap_at(&gap, &side, xyz, obstacle, point, err);
+            if (status == UZ_OK && gap < least) {
+                least = gap;
+                memcpy(at, point, sizeof at);
+            }
         }
+    double way = step / 2;
+    for (int k = 0; k < CLOSER && status == UZ_OK && least < length / STEPS; k++) {
+        const double from[2] = {at[0], at[1]};
+        const double before = least;
+        for (int j = 0; j < (dim == 2 ? 3 : 9) && status == UZ_OK; j++) {
+            const int along = j % 3 - 1, across = j / 3 - 1;
+            const double point[2] = {from[0] + way * along, dim == 2 ? from[1] : from[1] + way * across};
+            if (fmin(point[0], dim == 2 ? 0 : point[1]) < first || point[0] + (triangle ? point[1] : 0) > 1 ||
+                (dim == 3 && point[1] > 1))
+                continue;
+            status = gap_at(&gap, &side, xyz, obstacle, point, err);
+            if (status == UZ_OK && gap < least) {
+                least = gap;
+                memcpy(at, point, sizeof at);
+            }
+        }
+        way = least < before ? way : way / 2;
+    }
+    out->least_gap = fmin(out->least_gap, least);
+    const double part = length > 0 ? least / length : -(double)INFINITY;
+    out->least_part = fmin(out->least_part, part);
+    for (int a = 0; a < side.nodes; a++)
+        apart[node[a]] = fmin(apart[node[a]], part);
     return status;
+}
+
+/* Does a row press where no side around its node comes near the obstacle? Those of middles, which have a share of
+ * their ends' gaps, do where sides are long against a curved obstacle. */
+static void look_for_pressed_apart(uz_finite_certificate *out, const uz_finite_answer *of, const double *apart,
+                                   int64_t contact, double most)
+{
+    const uz_body_model *model = of->model;
+    for (int64_t i = 0; i < model->m; i++)
+        if (model->info.contact_of[i] == contact && !uz_row_inner(model, i) && of->r[i] < -PRESSED * most &&
+            isfinite(apart[model->info.contact_node[i]]))
+            out->pressed_apart = fmax(out->pressed_apart, apart[model->info.contact_node[i]]);
 }
 
 /* Nodes that have rows, from the obstacles themselves: what g says of them is checked by what it should be. A middle's
@@ -494,7 +542,8 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
     const uz_finite_answer *of = w->of;
     const int64_t n = of->scene->n_contacts;
     uz_obstacle **obstacle = uz_alloc_zero(n, sizeof *obstacle);
-    uz_status status = obstacle ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the obstacles");
+    double *apart = uz_alloc(of->model->mesh.n_nodes, sizeof *apart);
+    uz_status status = obstacle && apart ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the obstacles");
     for (int64_t k = 0; k < n && status == UZ_OK; k++) {
         if (of->scene->contacts[k].kind == UZ_OBSTACLE_BODY) {
             status = uz_pair_gaps(&out->least_gap, &out->least_part, of->model, of->scene, k, of->u, SAMPLES + 1, err);
@@ -503,8 +552,12 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
         const uz_group *group = uz_mesh_group(&of->model->mesh, of->scene->contacts[k].on, "/contacts", err);
         status =
             group ? uz_obstacle_new(&obstacle[k], &of->scene->contacts[k], k, of->scene->model, err) : UZ_ERR_SCENE;
+        for (int64_t a = 0; a < of->model->mesh.n_nodes; a++)
+            apart[a] = INFINITY;
         for (int64_t i = 0; status == UZ_OK && i < group->n_faces; i++)
-            status = look_at_side(out, of, group->face[i], obstacle[k], err);
+            status = look_at_side(out, apart, of, group->face[i], obstacle[k], err);
+        if (status == UZ_OK && group->n_faces > 0)
+            look_for_pressed_apart(out, of, apart, k, most);
         bool inside = false;
         if (status == UZ_OK)
             status = uz_swallows(&inside, of->model, of->scene, k, of->u, err);
@@ -517,6 +570,7 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
     for (int64_t k = 0; k < n && obstacle; k++)
         uz_obstacle_free(obstacle[k]);
     free(obstacle);
+    free(apart);
     for (int64_t i = 0; i < of->model->m; i++)
         out->worst_reaction = fmax(out->worst_reaction, most > 0 ? of->r[i] / most : of->r[i]);
     return status;

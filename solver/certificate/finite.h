@@ -37,8 +37,11 @@ typedef struct {
     double worst_reaction; /* the largest, > 0: an obstacle that pulls; relative to the largest in size */
     double worst_support;  /* by how much a supported dof is off what is prescribed, or a tied node off what it follows,
                             * or one of a rigid group off what the group's motion has it at: a length */
-    double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, and nodes */
-    double least_part;     /* the same over the length of the side there, of those between nodes */
+    double least_gap;      /* of the obstacles from points on the deformed sides, a length: SAMPLES a side, nodes, and
+                            * where a side is closest */
+    double least_part;     /* the same over the length of the side there */
+    double pressed_apart;  /* the farthest that the sides around a node with a pressed row are from the obstacle, over
+                            * their length; 0: none is apart */
     double least_at_rows;  /* of g */
     double least_at_nodes; /* of the obstacles, which have no overlap left, from the nodes that have rows */
     bool swallows;         /* an obstacle is inside of the body (swallowed.h) */

@@ -17,7 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An obstacle that stands deeper in a side between rows than this part of its length: rows leave 0.01 at most. */
+/* An obstacle that stands deeper in a side between rows than this part of its length, or presses it from farther away:
+ * rows leave 0.01 at most. */
 #define CUTS_IN 0.03
 /* Forces that are less than this part of those by which the strain energy comes from the largest displacement are what
  * equations leave, as of warmth, which holds itself. */
@@ -39,6 +40,13 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     char *text = s->message;
     const size_t size = sizeof s->message;
     const char *of = run->from ? "the way from the load of the case before it" : "the load";
+    if (s->outcome == UZ_MESH_LIMIT && load >= 1 && c->least_part >= -CUTS_IN) {
+        snprintf(text, size,
+                 "contact presses where the body is %.3g of a side's length away from the obstacle, as sides are long "
+                 "against its radius: use a finer mesh along the contact",
+                 c->pressed_apart);
+        return;
+    }
     if (s->outcome == UZ_MESH_LIMIT && load >= 1) {
         snprintf(text, size,
                  "the obstacle, or another body, stands %.3g of a side's length deep in it, between rows: use a finer "
@@ -93,9 +101,9 @@ static uz_outcome outcome_of(const uz_finite_run *run, uz_part why)
 {
     const uz_finite_certificate *c = &run->certificate;
     if (run->found.load >= 1)
-        return c->least_part < -CUTS_IN           ? UZ_MESH_LIMIT
-               : !(c->residual <= run->requested) ? UZ_PRECISION_LIMIT
-                                                  : UZ_CONVERGED;
+        return c->least_part < -CUTS_IN || c->pressed_apart > CUTS_IN ? UZ_MESH_LIMIT
+               : !(c->residual <= run->requested)                     ? UZ_PRECISION_LIMIT
+                                                                      : UZ_CONVERGED;
     return why == UZ_PART_INVERTED    ? UZ_INVERTED
            : why == UZ_PART_SWALLOWED ? UZ_MESH_LIMIT
            : why == UZ_PART_STOPPED   ? run->stopped

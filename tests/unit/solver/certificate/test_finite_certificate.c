@@ -190,6 +190,55 @@ TEST(a_certificate_that_is_stopped_says_so)
     give_back(&a);
 }
 
+/* A ball that is narrower than the points at which a side is looked at are apart is seen between them as deep as it is.
+ */
+TEST(an_obstacle_between_the_points_of_a_side)
+{
+    for (int solid = 0; solid < 2; solid++) {
+        uz_scene s = solid ? body_scene(UZ_SOLID, "hex20", (double[3]){4, 1, 1}, (int64_t[3]){1, 1, 1})
+                           : body_scene(UZ_PLANE_STRAIN, "quad8", (double[3]){4, 1, 0}, (int64_t[3]){1, 1, 0});
+        s.materials[0].young = 1;
+        s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        s.kinematics = UZ_KINEMATICS_FINITE;
+        body_hold(&s, "top", 0, 0, solid ? 0 : NAN);
+        uz_contact *ball = body_plane(&s, "bottom", (double[3]){1.25, -2, 0.6}, (double[3]){0, 1, 0});
+        ball->kind = UZ_OBSTACLE_ROUND;
+        ball->radius = 0.2;
+        answered a;
+        answer(&a, &s); /* nothing moves it */
+        CHECK(fabs(judge(&a).least_gap - 1.8) < 0.02);
+        a.scene.contacts[0].point[1] = -0.05;
+        const uz_finite_certificate c = judge(&a);
+        CHECK_MSG(fabs(c.least_gap + 0.15) < 1e-4 && c.least_part < -0.03, "%.6g %.6g", c.least_gap, c.least_part);
+        give_back(&a);
+    }
+}
+
+/* Rows of middles have a share of the gaps of their ends: before a ball as small as the side they press from afar. */
+TEST(what_is_pressed_from_afar)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex20", (double[3]){4, 1, 0.8}, (int64_t[3]){1, 1, 1});
+    s.materials[0].young = 1;
+    s.materials[0].poisson = 0;
+    s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    body_hold(&s, "top", 0, -0.15, 0);
+    uz_contact *ball = body_plane(&s, "bottom", (double[3]){2, -1.1, 0.4}, (double[3]){0, 1, 0});
+    ball->kind = UZ_OBSTACLE_ROUND;
+    ball->radius = 1;
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+    const uz_settings settings = uz_settings_default();
+    uz_result *result = NULL;
+    uz_error err = {0};
+    CHECK_MSG(uz_solve(&result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    const uz_summary *found = &result->summary;
+    CHECK_MSG(found->outcome == UZ_MESH_LIMIT && found->finite.least_gap > 0.1 &&
+                  strstr(found->message, "away from the obstacle"),
+              "%d, %g: %s", found->outcome, found->finite.least_gap, found->message);
+    uz_result_free(result);
+    uz_scene_clear(&s);
+}
+
 /* The same of solids, on a cylinder whose axis is oblique. */
 TEST(an_answer_of_a_solid_and_what_is_wrong_with_others)
 {
