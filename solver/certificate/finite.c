@@ -240,6 +240,60 @@ static void expand(uz_element *element, double *xyz, double *u, int n, int dim, 
         element->across = 1 / (1 + free_strain) - 1;
 }
 
+/* det F at a point, where the law has a stretch across a plane. */
+static double det_at(const uz_element *element, const double *u, const uz_lame *lame, uz_elasticity law,
+                     const double point[3])
+{
+    point_at x;
+    uz_piola at = {0};
+    double measure;
+    long double det = deform(&x, &measure, element, u, point);
+    if (det > 0 && element->model == UZ_PLANE_STRESS)
+        (void)law_at(&at, &det, &x, element, lame, law);
+    return (double)det;
+}
+
+/* The least det F on the edge between two corners: of points between them, and from the least of these on where they
+ * differ much. Both ends may be upright where it is not, as edges of quadratic elements bend. */
+static double least_on_edge(const uz_element *element, const double *u, const uz_lame *lame, uz_elasticity law,
+                            const double from[3], const double to[3])
+{
+    enum { PARTS = 4, HALVINGS = 6 };
+    double least = INFINITY, most = -INFINITY, at = 0, way = 1.0 / PARTS;
+    for (int k = 0; k <= PARTS + 2 * HALVINGS; k++) {
+        const int closer = k - PARTS - 1;
+        if (closer >= 0 && (least > 0.5 * most || least <= 0))
+            break;
+        way = closer >= 0 && closer % 2 == 0 ? way / 2 : way;
+        const double part = closer < 0 ? k * way : fmin(1, fmax(0, at + (closer % 2 == 0 ? way : -way)));
+        double point[3] = {0};
+        for (int c = 0; c < uz_element_type_of(element->kind)->dim; c++)
+            point[c] = from[c] + part * (to[c] - from[c]);
+        const double det = det_at(element, u, lame, law, point);
+        at = det < least ? part : at;
+        least = fmin(least, det);
+        most = fmax(most, det);
+    }
+    return least;
+}
+
+/* The least det F on the edges; at their ends alone where it changes evenly along each. */
+static double least_on_edges(const uz_element *element, const double *u, const uz_lame *lame, uz_elasticity law)
+{
+    const uz_element_type *type = uz_element_type_of(element->kind), *linear = uz_element_type_of(type->linear);
+    const bool even = type->nodes == type->corners && (type->dim == 2 || type->jacobian == UZ_JACOBIAN_CONSTANT);
+    double least = INFINITY;
+    for (int a = 0; a < type->corners; a++) {
+        if (even)
+            least = fmin(least, det_at(element, u, lame, law, type->local[a]));
+        for (int k = 0; k < type->dim && !even; k++)
+            if (linear->next[a][k] > a)
+                least =
+                    fmin(least, least_on_edge(element, u, lame, law, type->local[a], type->local[linear->next[a][k]]));
+    }
+    return least;
+}
+
 static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
@@ -253,7 +307,6 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     int nodes;
     const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
     uz_body_element(&element, xyz, model, e);
-    const uz_element_type *type = uz_element_type_of(element.kind);
     const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
     const uz_lame lame = uz_lame_in_space(element.model, element.lame);
     const uz_elasticity law = uz_element_material(model, e)->law;
@@ -268,12 +321,7 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
         u[i] = w->of->u[dim * node[i / dim] + i % dim];
     if (w->of->free_strain)
         expand(&element, xyz, u, n, dim, w->of->free_strain[e]);
-    for (int a = 0; a < type->corners; a++) {
-        long double det = deform(&x, &measure, &element, u, type->local[a]);
-        if (det > 0 && element.model == UZ_PLANE_STRESS)
-            (void)law_at(&at, &det, &x, &element, &lame, law);
-        out->least_det = fmin(out->least_det, (double)det);
-    }
+    out->least_det = fmin(out->least_det, least_on_edges(&element, u, &lame, law));
     const long double small = w->small, unit = w->unit; /* of the elements before */
     w->small = w->unit = 0;
     for (int g = 0; g < rule->count; g++) {

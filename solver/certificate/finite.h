@@ -23,7 +23,7 @@ typedef struct {
     bool stopped;     /* before the end: nothing else is told */
     double bytes;     /* what its tangent and its factor took */
     double energy;    /* strain energy, of the law's W, and that of springs */
-    double least_det; /* of F, at quadrature points and corners */
+    double least_det; /* of F, at quadrature points, corners and along edges that bend */
     /* (f' H^-1 f + 2 |r'g|)^(1/2) over the root of twice the energy: H is the second derivatives of the Lagrangian with
      * stiffness along the pressed rows, f what the forces on free dofs leave over, with what that stiffness makes of
      * gaps of these rows; r'g of the others. To first order a bound on the distance from the equilibrium, in the norm

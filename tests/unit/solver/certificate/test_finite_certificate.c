@@ -214,6 +214,26 @@ TEST(an_obstacle_between_the_points_of_a_side)
     }
 }
 
+/* Both corners of an edge and all quadrature points are upright, and the edge between them is not. */
+TEST(an_edge_that_is_inside_out_between_its_ends)
+{
+    static const double MOVED[9][2] = {
+        {0, 0},      {-0.44, -0.3}, {0.3, 0.08},   {0.2, -0.09}, {0.34, -0.34},
+        {0.37, 0.5}, {0, 0},        {0.16, -0.19}, {0, 0}}; /* rows of three from below */
+    uz_scene s = block("tri6", 1, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "left", 0, 0, NAN);
+    answered a;
+    answer(&a, &s);
+    uz_result *r = a.result;
+    CHECK(judge(&a).least_det == 1);
+    for (int64_t i = 0; i < r->n_nodes; i++)
+        for (int c = 0; c < 2; c++)
+            r->u[2 * i + c] = MOVED[lround(2 * r->mesh.xyz[2 * i]) + 3 * lround(2 * r->mesh.xyz[2 * i + 1])][c];
+    const uz_finite_certificate c = judge(&a);
+    CHECK_MSG(c.least_det < -1 && isinf(c.residual) && !c.definite, "%g", c.least_det);
+    give_back(&a);
+}
+
 /* Rows of middles have a share of the gaps of their ends: before a ball as small as the side they press from afar. */
 TEST(what_is_pressed_from_afar)
 {
