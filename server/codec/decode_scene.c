@@ -476,7 +476,10 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
     out->model = (uz_model)word_of(json_get(object, "model"), MODELS);
     out->formulation = (uz_formulation)word_of(json_get(object, "formulation"), FORMULATIONS);
-    out->kinematics = (uz_kinematics)word_of(json_get(object, "kinematics"), KINEMATICS);
+    /* small is another word for fixed, which is more than that: contact does not move either */
+    out->kinematics = json_text_is(json_get(object, "kinematics"), "small")
+                          ? UZ_KINEMATICS_FIXED
+                          : (uz_kinematics)word_of(json_get(object, "kinematics"), KINEMATICS);
     out->thickness = json_number(json_get(object, "thickness"), 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
     if (!decode_units(&out->units, d, json_get(object, "units")))
