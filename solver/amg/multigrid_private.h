@@ -127,7 +127,7 @@ static inline int uz_width(int b)
  *
  * Of conjugate gradients whose residual is kept swept (rough.c), instead of the sweep down: REDUCE: x = (D + L)^-1 b,
  * swept -= share (along + x), each lane by a share of its own, and t = -L'swept; RAISE: x = (D + L) swept. Instead of
- * the way up: PLACE: x = P coarse, and t = 0, which RISE begins with: x = (D + L')^-1 (D swept - L x), t = L'x and
+ * the way up: PLACE: x = P coarse, and t = 0; RISE: x = (D + L')^-1 (D swept - t - L x), t += L'x, and of that t
  * product = swept'(D x + t) of each lane, in double precision; swept is 0 at dofs without an inverse. */
 typedef struct {
     const uz_level *level;

@@ -121,25 +121,31 @@ static void add_sums(spread_system *s)
 {
     const uz_blocks *A = &s->level.A;
     const int b = s->b;
-    const int64_t here = s->near.here;
+    const int64_t here = s->near.here, first = A->ptr[here], last = A->ptr[A->nodes];
+    int32_t *place = new_zeros(here, sizeof *place);
     s->outside = new_zeros(here * b, sizeof *s->outside);
     s->face = new_zeros(here, sizeof *s->face);
-    for (int64_t i = here; i < A->nodes; i++)
-        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
-            for (int r = 0; r < b; r++)
-                for (int c = 0; c < b; c++)
-                    s->outside[A->idx[e] * b + c] += fabsf(s->level.off[(e * b + r) * b + c]);
+    s->rim = new_zeros(last - first, sizeof *s->rim);
+    for (int64_t e = first; e < last; e++) {
+        place[A->idx[e]] = 1;
+        for (int r = 0; r < b; r++)
+            for (int c = 0; c < b; c++)
+                s->outside[A->idx[e] * b + c] += fabsf(s->level.off[(e * b + r) * b + c]);
+    }
     for (int64_t i = 0; i < here; i++) {
-        bool any = false;
         for (int c = 0; c < b; c++) {
             float *own = &s->level.diag[(i * b + c) * b + c];
-            any = any || s->outside[i * b + c] > 0.0F;
             *own += s->outside[i * b + c];
             s->level.inverse[i * b + c] = 1.0F / *own;
         }
-        if (any)
+        if (place[i]) {
+            place[i] = (int32_t)s->faces;
             s->face[s->faces++] = (int32_t)i;
+        }
     }
+    for (int64_t e = first; e < last; e++)
+        s->rim[e - first] = place[A->idx[e]];
+    free(place);
 }
 
 /* The norm of D^-1/2 L D^-1/2 is at most the root of its largest row sum times its largest column sum. */
@@ -572,6 +578,8 @@ static void make_room(spread_system *s)
     s->rhs = new_zeros(size, sizeof *s->rhs);
     s->x = new_zeros(size, sizeof *s->x);
     s->t = new_zeros(size, sizeof *s->t);
+    s->ghosts = new_zeros(4 * LANES * s->near.ghosts, sizeof *s->ghosts);
+    s->brim = new_zeros(2 * 4 * LANES * s->faces, sizeof *s->brim);
     s->lanes = 1;
     s->single = true;
     s->diagonal = new_zeros(4 * s->near.here, sizeof *s->diagonal);
@@ -720,10 +728,10 @@ int system_levels(const spread_system *s, int which)
 void system_free(spread_system *s)
 {
     uz_level *level = &s->level;
-    void *own[] = {s->scale,     level->off, level->diag, level->inverse, level->ptr, level->block,
-                   level->value, s->face,    s->outside,  s->modes,       s->rhs,     s->x,
-                   s->t,         s->coarse,  s->coarse_r, s->coarse_z,    s->u,       s->f,
-                   s->r,         s->z,       s->p,        s->q,           s->diagonal};
+    void *own[] = {s->scale,    level->off,  level->diag, level->inverse, level->ptr, level->block, level->value,
+                   s->face,     s->outside,  s->modes,    s->rhs,         s->x,       s->t,         s->coarse,
+                   s->coarse_r, s->coarse_z, s->u,        s->f,           s->r,       s->z,         s->p,
+                   s->q,        s->diagonal, s->rim,      s->ghosts,      s->brim};
     free_variant(s, VARIANT_HELD);
     free_variant(s, VARIANT_WHOLE);
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)

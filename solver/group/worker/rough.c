@@ -66,60 +66,94 @@ static void find_diagonal(spread_system *s, int which)
             s->diagonal[4 * i + r] = inverse[i * b + r] > 0.0F ? s->level.diag[(i * b + r) * b + r] : 0.0F;
 }
 
-/* From s and t = -L's: z in s->x, L'z in s->t, and r'z. */
+/* From s and t = -L's: z in s->x, L'z in s->t, and r'z. E (s + c) stands in t when the sweep up begins, which takes it
+ * from its right-hand side, and is taken from what it leaves there. */
 static void precondition(spread_system *s, int which, const rough *v)
 {
     const variant *of = &s->variant[which];
+    const int width = 4 * s->lanes;
+    float *of_s = s->brim, *of_x = s->brim + width * s->faces;
     double sum[LANES] = {0};
-    for (int64_t i = 0; i < v->count; i++)
-        for (int c = 0; c < 4; c++)
-            s->rhs[4 * i + c] = s->diagonal[4 * (i >> v->shift) + c] * v->s[4 * i + c];
-    memset(s->x, 0, 4 * (size_t)v->count * sizeof *s->x);
-    add_outside(s, s->rhs, v->s, 1.0F);
+    uz_level all = s->level; /* ghosts, too */
+    uz_level_step up = v->step, place = v->step;
+    place.level = &all;
+    up.product = sum;
+    meet_ghosts(s, v->s);
+    find_outside(s, of_s, v->s, s->ghosts);
     if (of->base) {
-        add_known_outside(s, s->t, v->s, 1.0F);
+        add_to_faces(s, s->t, of_s);
         system_correct(s, of, &v->step);
-        add_outside(s, s->rhs, s->x, 1.0F);
+        uz_level_take_step(&place, UZ_STEP_PLACE);
+        find_outside(s, of_x, s->x, s->x + width * s->near.here);
+    } else {
+        memset(s->x, 0, (size_t)(width * s->near.here) * sizeof *s->x);
+        memset(s->t, 0, (size_t)(width * s->near.here) * sizeof *s->t);
+        memset(of_x, 0, (size_t)(width * s->faces) * sizeof *of_x);
     }
-    uz_level_take_step(&v->step, UZ_STEP_SWEEP_UP);
-    for (int64_t i = 0; i < v->count; i++) {
-        const float *d = s->diagonal + 4 * (i >> v->shift);
-        float part = 0.0F;
-        for (int64_t c = 0; c < 4; c++)
-            part += v->s[4 * i + c] * (d[c] * s->x[4 * i + c] + s->t[4 * i + c]);
-        sum[i & v->mask] += (double)part;
-    }
+    for (int64_t q = 0; q < width * s->faces; q++)
+        of_s[q] = -(of_s[q] + of_x[q]);
+    add_to_faces(s, s->t, of_s);
+    uz_level_take_step(&up, UZ_STEP_RISE);
+    for (int64_t f = 0; f < s->faces; f++)
+        for (int q = 0; q < width; q++) {
+            const int64_t at = width * (int64_t)s->face[f] + q;
+            s->t[at] -= of_s[width * f + q];
+            sum[q / 4] -= (double)v->s[at] * (double)of_s[width * f + q];
+        }
     combine_all(sum, LANES, MPI_DOUBLE, MPI_SUM);
     for (int l = 0; l < LANES; l++)
         s->square[l] = s->unit[l] * s->unit[l] * sum[l];
 }
 
-/* x takes the last step; the next direction, w + E p in s->rhs, and p'A p. */
-static void turn(spread_system *s, const rough *v, double curvature[LANES])
+typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double four __attribute__((vector_size(32)));
+
+/* x takes the last step; the next direction, and of p'A p what the own sweeps see: p'(D'p + 2 w). */
+static void turn_own(spread_system *s, const rough *v, double curvature[LANES])
 {
-    float beta[LANES], last[LANES];
-    memset(curvature, 0, LANES * sizeof *curvature);
-    memcpy(last, s->length, sizeof last);
-    memset(s->length, 0, sizeof s->length);
+    float beta[LANES];
+    four sum[LANES] = {{0.0}};
     for (int l = 0; l < LANES; l++)
         beta[l] = s->before[l] > 0.0 ? (float)(s->square[l] / s->before[l]) : 0.0F;
     for (int64_t i = 0; i < v->count; i++) {
-        const float along = beta[i & v->mask], length = last[i & v->mask];
-        for (int64_t c = 4 * i; c < 4 * i + 4; c++) {
-            v->x[c] += length * v->p[c];
-            v->p[c] = s->x[c] + along * v->p[c];
-            s->rhs[c] = v->w[c] = s->t[c] + along * v->w[c];
+        const int l = (int)(i & v->mask);
+        const four_floats d = *(const four_floats *)(s->diagonal + 4 * (i >> v->shift)),
+                          z = *(const four_floats *)(s->x + 4 * i), t = *(const four_floats *)(s->t + 4 * i);
+        four_floats *p = (four_floats *)(v->p + 4 * i), *w = (four_floats *)(v->w + 4 * i);
+        *(four_floats *)(v->x + 4 * i) += s->length[l] * *p;
+        const four_floats next = z + beta[l] * *p, image = t + beta[l] * *w;
+        *p = next;
+        *w = image;
+        sum[l] += __builtin_convertvector(next, four) * __builtin_convertvector(d * next + 2.0F * image, four);
+    }
+    memset(s->length, 0, sizeof s->length);
+    for (int l = 0; l < LANES; l++)
+        curvature[l] = (sum[l][0] + sum[l][1]) + (sum[l][2] + sum[l][3]);
+}
+
+/* The next direction, p'A p, and w + E p in w, until that is restored from what the brim has kept of it. */
+static void turn(spread_system *s, const rough *v, double curvature[LANES])
+{
+    const int width = 4 * s->lanes;
+    float *outside = s->brim, *kept = s->brim + width * s->faces;
+    turn_own(s, v, curvature);
+    meet_ghosts(s, v->p);
+    find_outside(s, outside, v->p, s->ghosts);
+    for (int64_t f = 0; f < s->faces; f++)
+        for (int q = 0; q < width; q++) {
+            const int64_t at = width * (int64_t)s->face[f] + q;
+            curvature[q / 4] -= (double)v->p[at] * (double)outside[width * f + q];
+            kept[width * f + q] = v->w[at];
+            v->w[at] -= outside[width * f + q];
         }
-    }
-    add_outside(s, s->rhs, v->p, -1.0F);
-    for (int64_t i = 0; i < v->count; i++) {
-        const float *d = s->diagonal + 4 * (i >> v->shift);
-        float part = 0.0F;
-        for (int64_t c = 0; c < 4; c++)
-            part += v->p[4 * i + c] * (d[c] * v->p[4 * i + c] + (v->w[4 * i + c] + s->rhs[4 * i + c]));
-        curvature[i & v->mask] += (double)part;
-    }
     combine_all(curvature, LANES, MPI_DOUBLE, MPI_SUM);
+}
+
+static void restore(const spread_system *s, const rough *v)
+{
+    const int width = 4 * s->lanes;
+    for (int64_t f = 0; f < s->faces; f++)
+        memcpy(v->w + width * (int64_t)s->face[f], s->brim + width * (s->faces + f), (size_t)width * sizeof *v->w);
 }
 
 /* False: none can be made, as where K is not definite, or rounding has all. */
@@ -138,9 +172,11 @@ static bool take_step(spread_system *s, int which, rough *v)
         return false;
     memcpy(s->before, s->square, sizeof s->before);
     uz_level_step down = v->step;
+    down.b = v->w;
     down.along = v->p;
     memcpy(down.share, s->length, sizeof down.share);
     uz_level_take_step(&down, UZ_STEP_REDUCE);
+    restore(s, v);
     precondition(s, which, v);
     return true;
 }
@@ -198,6 +234,13 @@ static bool is_far(const spread_system *s)
     return far;
 }
 
+/* Less than what single precision hides is not to be told: few steps may end a small system at once. */
+static void tell_hidden(spread_system *s, double believed)
+{
+    for (int l = 0; l < s->lanes; l++)
+        s->square[l] = fmax(s->square[l], UZ_HIDDEN * UZ_HIDDEN * believed * s->known[l]);
+}
+
 int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2, double believed)
 {
     rough v;
@@ -209,8 +252,10 @@ int rough_steps(spread_system *s, int which, bool *stuck, int most, double goal2
         made += !*stuck;
         if (*stuck)
             break;
-        if (system_square(s) <= goal2 && goal2 >= believed * worse(s, s->known))
+        if (system_square(s) <= goal2 && goal2 >= believed * worse(s, s->known)) {
+            tell_hidden(s, believed);
             break;
+        }
         if (is_far(s) || system_square(s) <= goal2) {
             const double told = fmax(system_square(s), CARRIED * CARRIED * worse(s, s->known));
             system_settle(s);

@@ -17,32 +17,53 @@
 #include <math.h>
 #include <string.h>
 
-void add_known_outside(const spread_system *s, float *to, const float *x, float sign)
+typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
+
+/* Rows of blocks are read four numbers at a time; what the next one begins with goes to the surplus number. */
+UZ_INLINE void take_from_ghosts(const spread_system *s, float *brim, const float *ghosts, int b, int lanes)
 {
-    const neighbours *near = &s->near;
     const uz_blocks *A = &s->level.A;
-    const int b = s->b, width = 4 * s->lanes;
-    const float *of_ghosts = s->x + width * near->here;
-    for (int64_t f = 0; f < s->faces; f++)
-        for (int q = 0; q < width; q += 4)
-            for (int c = 0; c < b; c++) {
-                const int64_t at = width * (int64_t)s->face[f] + q + c;
-                to[at] += sign * s->outside[s->face[f] * b + c] * x[at];
-            }
-    for (int64_t g = 0; g < near->ghosts; g++)
-        for (int64_t e = A->ptr[near->here + g]; e < A->ptr[near->here + g + 1]; e++)
-            for (int q = 0; q < width; q += 4)
+    const int64_t here = s->near.here;
+    const float *block = s->level.off + A->ptr[here] * b * b;
+    const int32_t *rim = s->rim;
+    for (int64_t g = 0; g < s->near.ghosts; g++)
+        for (int64_t e = A->ptr[here + g]; e < A->ptr[here + g + 1]; e++, block += (int64_t)b * b, rim++)
+            for (int l = 0; l < lanes; l++) {
+                const float *value = ghosts + 4 * (g * lanes + l);
+                four *at = (four *)(brim + 4 * ((int64_t)*rim * lanes + l)), sum = *at;
                 for (int r = 0; r < b; r++)
-                    for (int c = 0; c < b; c++)
-                        to[width * (int64_t)A->idx[e] + q + c] -=
-                            sign * s->level.off[(e * b + r) * b + c] * of_ghosts[width * g + q + r];
+                    sum -= *(const four *)(block + r * b) * value[r];
+                *at = sum;
+            }
 }
 
-void add_outside(spread_system *s, float *to, const float *x, float sign)
+void find_outside(const spread_system *s, float *brim, const float *x, const float *ghosts)
 {
-    const size_t width = 4 * (size_t)s->lanes;
-    neighbours_fetch(&s->near, s->x + width * (size_t)s->near.here, x, width * sizeof *x);
-    add_known_outside(s, to, x, sign);
+    const int b = s->b, lanes = s->lanes, width = 4 * lanes;
+    memset(brim, 0, (size_t)(s->faces * width) * sizeof *brim);
+    if (b == 3)
+        take_from_ghosts(s, brim, ghosts, 3, lanes);
+    else
+        take_from_ghosts(s, brim, ghosts, b, lanes);
+    for (int64_t f = 0; f < s->faces; f++)
+        for (int q = 0; q < width; q++) {
+            const int c = q % 4;
+            float *sum = &brim[width * f + q];
+            *sum = c < b ? *sum + s->outside[s->face[f] * b + c] * x[width * (int64_t)s->face[f] + q] : 0.0F;
+        }
+}
+
+void meet_ghosts(spread_system *s, const float *x)
+{
+    neighbours_fetch(&s->near, s->ghosts, x, 4 * (size_t)s->lanes * sizeof *x);
+}
+
+void add_to_faces(const spread_system *s, float *to, const float *brim)
+{
+    const int width = 4 * s->lanes;
+    for (int64_t f = 0; f < s->faces; f++)
+        for (int q = 0; q < width; q++)
+            to[width * (int64_t)s->face[f] + q] += brim[width * f + q];
 }
 
 /* Where each process does it alone; lane by lane. */
@@ -70,7 +91,6 @@ void system_correct(spread_system *s, const variant *v, const uz_level_step *ste
         shared_apply(&v->shared, v->base, v->room, s->coarse, s->lanes);
     else
         correct_alone(s, v);
-    uz_level_take_step(step, UZ_STEP_PROLONG);
 }
 
 /* Vectors are fours of numbers, one for each node and lane; how many there are here, and the lane of one. */
@@ -112,6 +132,13 @@ void system_scale(const spread_system *s, float *to, const double *r, const doub
     }
 }
 
+static void add_outside(spread_system *s, float *to)
+{
+    meet_ghosts(s, s->x);
+    find_outside(s, s->brim, s->x, s->ghosts);
+    add_to_faces(s, to, s->brim);
+}
+
 static void cycle(spread_system *s, int which, double *z, const double *r, const double unit[LANES])
 {
     const variant *v = &s->variant[which];
@@ -127,11 +154,14 @@ static void cycle(spread_system *s, int which, double *z, const double *r, const
                                 .k = s->k,
                                 .lanes = s->lanes};
     uz_level_take_step(&step, UZ_STEP_SWEEP_DOWN);
+    add_outside(s, s->t);
     if (v->base) {
-        add_outside(s, s->t, s->x, 1.0F);
         system_correct(s, v, &step);
+        uz_level_take_step(&step, UZ_STEP_PROLONG);
+        add_outside(s, s->rhs);
+    } else {
+        add_to_faces(s, s->rhs, s->brim);
     }
-    add_outside(s, s->rhs, s->x, 1.0F);
     uz_level_take_step(&step, UZ_STEP_SWEEP_UP);
     for (int64_t i = 0; i < fours(s); i++) {
         const double by = isinf(unit[lane_of(s, i)]) ? NAN : unit[lane_of(s, i)];

@@ -76,7 +76,8 @@ typedef struct {
     double *scale;  /* here x b: powers of two that make the diagonal about 1 */
     uz_level level; /* own nodes, then ghosts, whose rows are what couples them with the own ones */
     int64_t faces;  /* own nodes with ghosts, */
-    int32_t *face;  /* which */
+    int32_t *face;  /* which, */
+    int32_t *rim;   /* and of each block in the rows of ghosts the place of its own node among them */
     float *outside; /* here x b: the absolute sums of what is coupled with ghosts */
     uz_blocks next; /* the next matrix; without numbers off the diagonal where there are coarser ones */
     uz_blocks loss; /* in its places: 0 but while dofs are held */
@@ -84,6 +85,7 @@ typedef struct {
     variant variant[VARIANTS];
     int lanes; /* of the solve at hand: 1 or LANES */
     float *rhs, *x, *t, *coarse;
+    float *ghosts, *brim;          /* numbers of ghosts, and of faces: twice as many */
     double *coarse_r, *coarse_z;   /* next.nodes x k */
     float *diagonal;               /* here x 4: of A, 0 where dofs take no part; of rough.c */
     double *u, *f, *r, *z, *p, *q; /* vectors */
@@ -136,11 +138,13 @@ int system_steps(spread_system *s, int which, bool *flat, int most, double goal2
 void system_residual(spread_system *s, int which, bool u_is_zero);
 /* to (here) = r in single precision, by the units of the lanes, powers of two. */
 void system_scale(const spread_system *s, float *to, const double *r, const double unit[LANES]);
-/* to += sign ((D' - D) x - O x): what the own sweeps, of which D' + L + L' is the matrix, see of the difference to A.
- * add_known_outside: of the x that add_outside was last called with. */
-void add_outside(spread_system *s, float *to, const float *x, float sign);
-void add_known_outside(const spread_system *s, float *to, const float *x, float sign);
-/* The coarse correction of what the step's sweep down has left. */
+/* brim (faces x 4 for each lane) = (D' - D) x - O x: what the own sweeps, of which D' + L + L' is the matrix, do not
+ * see of A, but for its sign. Elsewhere that is 0. ghosts: of x, s->ghosts by meet_ghosts. */
+void find_outside(const spread_system *s, float *brim, const float *x, const float *ghosts);
+void meet_ghosts(spread_system *s, const float *x);
+/* to += it. */
+void add_to_faces(const spread_system *s, float *to, const float *brim);
+/* The coarse correction of what the step's sweep down has left: step->coarse. */
 void system_correct(spread_system *s, const variant *v, const uz_level_step *step);
 
 /* From s->r. */
