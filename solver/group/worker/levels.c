@@ -636,9 +636,11 @@ void system_create(spread_system *s, spread_rows *rows)
 static uz_blocks zeros_like(const uz_blocks *A)
 {
     const int64_t size = (int64_t)A->b * A->b;
-    uz_blocks made = *A;
-    made.off = new_zeros(A->ptr[A->nodes] * size + 4, sizeof *made.off);
-    made.diag = new_zeros(A->nodes * size + 4, sizeof *made.diag);
+    uz_blocks made = *A; /* little of it is touched as a rule: no page is taken before that */
+    made.off = uz_alloc_zero(A->ptr[A->nodes] * size + 4, sizeof *made.off);
+    made.diag = uz_alloc_zero(A->nodes * size + 4, sizeof *made.diag);
+    if (!made.off || !made.diag)
+        end_group("no memory");
     return made;
 }
 
