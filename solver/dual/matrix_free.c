@@ -416,6 +416,9 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* A guess by coarser grids is wrong in few rows. */
 #define STARTED_TOLERANCE 1e-3
 #define NEXT_TOLERANCE    0.1
+/* Where solves are elsewhere, looking at a guess on the way costs as much as some steps: what is to be solved within
+ * this many times the last tolerance, so that the next guess would be for that, is solved for it at once. */
+#define AT_ONCE 10.0
 /* Nor better, where few dofs have bounds, than to this share of what the guess changes: the next one would change more
  * than that. Plane bodies take more guesses above this share, solids none of 0.2. */
 #define GUESS_KEPT 0.05
@@ -526,7 +529,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim,
                  root = sqrt(load->dual->amg->info.lambda);
     stepwise on_way = {x, g, active, least};
-    double tolerance = fmax(least, x->coarse), *e = x->cg.r;
+    const bool at_once = cg->mg->kind->solve && x->coarse < AT_ONCE * least;
+    double tolerance = at_once ? least : fmax(least, x->coarse), *e = x->cg.r;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     uz_sparse_multiply(load, cg->r, box->u);
     double square = uz_sum_by_pieces(leave_residual, x, d); /* u'K u */
