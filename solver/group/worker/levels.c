@@ -14,14 +14,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+void *new_room(int64_t count, size_t size)
+{
+    void *made = uz_alloc(count > 0 ? count : 1, size); /* on large pages */
+    if (!made)
+        end_group("no memory");
+    return made;
+}
+
 void *new_zeros(int64_t count, size_t size)
 {
-    count = count > 0 ? count : 1;
-    void *made = uz_alloc(count, size); /* on large pages */
-    if (made)
-        memset(made, 0, (size_t)count * size);
-    else
-        end_group("no memory");
+    void *made = new_room(count, size);
+    memset(made, 0, (size_t)(count > 0 ? count : 1) * size);
     return made;
 }
 

@@ -15,24 +15,38 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { ROWS_PARTS = 4 }; /* of a message: values, counts, columns, modes */
+
 /* A body, its rows by process. */
 typedef struct {
     int64_t id; /* 0: this place is free */
     PetscInt nodes, bs, modes, arrived;
-    PetscMPIInt *count, *first; /* dofs of each process, and the first of them */
-    int64_t blocks;             /* of the rows here */
-    PetscInt here, filled;      /* nodes here, and those that have come */
-    spread_rows rows;           /* until the levels are made */
+    PetscMPIInt *count, *first;    /* dofs of each process, and the first of them */
+    int64_t blocks, filled_blocks; /* of the rows here, and those that have come */
+    PetscInt here, filled;         /* nodes here, and those that have come */
+    int32_t *counts;               /* filled: blocks of each; like the rows until the levels are made */
+    spread_rows rows;
     spread_system system;
     bool made[VARIANTS];
 } body;
+
+/* Rows on their way through the first process to another one, which may be behind. */
+enum { LETTERS = 8 };
+typedef struct {
+    void *rows;
+    size_t room;
+    int count; /* of requests that may be under way */
+    MPI_Request request[ROWS_PARTS];
+} letter;
 
 typedef struct {
     int stream; /* of the first process */
     PetscMPIInt rank, size;
     body body[UZ_WIRE_BODIES];
-    void *whole; /* what follows a head, or an answer; of other processes rows on their way; room of `room` bytes */
+    void *whole; /* what follows a head, or an answer; room of `room` bytes */
     size_t room;
+    letter out[LETTERS]; /* taken in turn */
+    int next;
 } group;
 
 #define IS_FIRST(g) ((g)->rank == 0)
@@ -71,22 +85,63 @@ static body *find(group *g, int64_t id)
     return NULL;
 }
 
-static void *need_room(group *g, size_t bytes)
+static void *grow(void **block, size_t *room, size_t bytes)
 {
-    if (g->room < bytes) {
-        free(g->whole);
-        g->whole = new_zeros((int64_t)bytes, 1);
-        g->room = bytes;
+    if (*room < bytes) {
+        free(*block);
+        *block = new_room((int64_t)bytes, 1);
+        *room = bytes;
     }
-    return g->whole;
+    return *block;
 }
 
-static size_t bytes_of_rows(const body *b, const uz_wire_head *m)
+static void *need_room(group *g, size_t bytes)
+{
+    return grow(&g->whole, &g->room, bytes);
+}
+
+static letter *next_letter(group *g)
+{
+    letter *to = &g->out[g->next++ % LETTERS];
+    wait_for(to->count, to->request);
+    to->count = 0;
+    return to;
+}
+
+/* All that was sent has arrived. */
+static void free_letters(group *g)
+{
+    for (int k = 0; k < LETTERS; k++) {
+        letter *one = next_letter(g);
+        free(one->rows);
+        *one = (letter){.rows = NULL};
+    }
+}
+
+static size_t bytes_of_rows(size_t size[ROWS_PARTS], const body *b, const uz_wire_head *m)
 {
     const size_t nodes = (size_t)m->a, blocks = (size_t)m->b, bs = (size_t)b->bs;
     if (m->a <= 0 || m->a > b->nodes || m->b < m->a || m->b > INT_MAX / (8 * 6 * 6 * 2))
         end_group("rows of no size that can be");
-    return blocks * (8 * bs * bs + 4) + nodes * 4 * (1 + bs * (size_t)b->modes);
+    size[0] = blocks * bs * bs * sizeof *b->rows.value;
+    size[1] = nodes * sizeof *b->counts;
+    size[2] = blocks * sizeof *b->rows.column;
+    size[3] = nodes * bs * (size_t)b->modes * sizeof *b->rows.mode;
+    return size[0] + size[1] + size[2] + size[3];
+}
+
+/* The places of rows that are this process's; they are taken. */
+static void place_rows(void *to[ROWS_PARTS], body *b, const uz_wire_head *m)
+{
+    const PetscInt nodes = (PetscInt)m->a, bs = b->bs;
+    if (b->filled + nodes > b->here || b->filled_blocks + m->b > b->blocks)
+        end_group("more rows than were told of");
+    to[0] = b->rows.value + b->filled_blocks * bs * bs;
+    to[1] = b->counts + b->filled;
+    to[2] = b->rows.column + b->filled_blocks;
+    to[3] = b->rows.mode + b->filled * bs * b->modes;
+    b->filled += nodes;
+    b->filled_blocks += m->b;
 }
 
 static int lanes_of(const uz_wire_head *m)
@@ -96,40 +151,72 @@ static int lanes_of(const uz_wire_head *m)
     return (int)m->c;
 }
 
-/* What follows a head the first process has read before the others hear of it: till then they sleep, and leave their
- * processors to who makes it. */
-static size_t bytes_behind(group *g, const uz_wire_head *m)
+/* From the first process to another, and there. */
+static void start_send(MPI_Request *request, int process, const void *from, size_t size)
 {
-    if (m->version != UZ_WIRE_VERSION)
-        return 0;
-    if (m->kind == UZ_WIRE_ROWS)
-        return bytes_of_rows(find(g, m->id), m);
-    if (m->kind != UZ_WIRE_HOLD && m->kind != UZ_WIRE_BEGIN && m->kind != UZ_WIRE_APPLY)
-        return 0;
-    const body *b = find(g, m->id);
-    const size_t n = (size_t)(b->nodes * b->bs);
-    if (m->kind == UZ_WIRE_HOLD)
-        return n;
-    return n * sizeof(double) * (m->kind == UZ_WIRE_APPLY ? 1 : (size_t)lanes_of(m) * (m->b != 1 ? 2 : 1));
+    if (size > INT_MAX)
+        end_group("more at once than a message holds");
+    MPI_Isend(from, (int)size, MPI_BYTE, process, 1, PETSC_COMM_WORLD, request);
 }
 
-/* From the first process to another. */
+static void start_receive(MPI_Request *request, void *to, size_t size)
+{
+    if (size > INT_MAX)
+        end_group("more at once than a message holds");
+    MPI_Irecv(to, (int)size, MPI_BYTE, 0, 1, PETSC_COMM_WORLD, request);
+}
+
 static void send_to(int process, const void *from, size_t size)
 {
     MPI_Request request;
-    if (size > INT_MAX)
-        end_group("more at once than a message holds");
-    MPI_Isend(from, (int)size, MPI_BYTE, process, 1, PETSC_COMM_WORLD, &request);
+    start_send(&request, process, from, size);
     wait_for(1, &request);
 }
 
 static void receive(void *to, size_t size)
 {
     MPI_Request request;
-    if (size > INT_MAX)
-        end_group("more at once than a message holds");
-    MPI_Irecv(to, (int)size, MPI_BYTE, 0, 1, PETSC_COMM_WORLD, &request);
+    start_receive(&request, to, size);
     wait_for(1, &request);
+}
+
+/* Its own rows the first process reads where they belong, and another's on their way there. */
+static void read_rows(group *g, const uz_wire_head *m)
+{
+    size_t size[ROWS_PARTS];
+    void *to[ROWS_PARTS];
+    body *b = find(g, m->id);
+    const size_t all = bytes_of_rows(size, b, m);
+    if (m->c < 0 || m->c >= g->size)
+        end_group("rows for no process");
+    if (m->c == 0) {
+        place_rows(to, b, m);
+        for (int k = 0; k < ROWS_PARTS; k++)
+            take(g, to[k], size[k]);
+        return;
+    }
+    letter *passed = next_letter(g);
+    char *from = grow(&passed->rows, &passed->room, all);
+    take(g, from, all);
+    for (int k = 0; k < ROWS_PARTS; from += size[k++])
+        start_send(&passed->request[passed->count++], (int)m->c, from, size[k]);
+}
+
+/* What follows a head the first process has read before the others hear of it: till then they sleep, and leave their
+ * processors to who makes it. */
+static void read_behind(group *g, const uz_wire_head *m)
+{
+    if (m->version != UZ_WIRE_VERSION)
+        return;
+    if (m->kind == UZ_WIRE_ROWS) {
+        read_rows(g, m);
+    } else if (m->kind == UZ_WIRE_HOLD || m->kind == UZ_WIRE_BEGIN || m->kind == UZ_WIRE_APPLY) {
+        const body *b = find(g, m->id);
+        size_t bytes = (size_t)(b->nodes * b->bs);
+        if (m->kind != UZ_WIRE_HOLD)
+            bytes *= sizeof(double) * (m->kind == UZ_WIRE_APPLY ? 1 : (size_t)lanes_of(m) * (m->b != 1 ? 2 : 1));
+        take(g, need_room(g, bytes), bytes);
+    }
 }
 
 /* ---- a body comes in */
@@ -239,10 +326,10 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     b->here = (PetscInt)of[2 * g->rank];
     b->blocks = of[2 * g->rank + 1];
     PetscCall(PetscFree(of));
-    b->rows.ptr = new_zeros(b->here + 1, sizeof *b->rows.ptr);
-    b->rows.column = new_zeros(b->blocks, sizeof *b->rows.column);
-    b->rows.value = new_zeros(b->blocks * b->bs * b->bs, sizeof *b->rows.value);
-    b->rows.mode = new_zeros(b->here * b->bs * b->modes, sizeof *b->rows.mode);
+    b->counts = new_room(b->here, sizeof *b->counts);
+    b->rows.column = new_room(b->blocks, sizeof *b->rows.column);
+    b->rows.value = new_room(b->blocks * b->bs * b->bs, sizeof *b->rows.value);
+    b->rows.mode = new_room(b->here * b->bs * b->modes, sizeof *b->rows.mode);
     PetscFunctionReturn(0);
 }
 
@@ -258,13 +345,15 @@ static void tell_made(group *g, const body *b, int which, double start)
                              .y = MPI_Wtime() - start});
 }
 
-static void free_rows(spread_rows *rows)
+static void free_rows(body *b)
 {
-    free(rows->ptr);
-    free(rows->column);
-    free(rows->value);
-    free(rows->mode);
-    *rows = (spread_rows){0};
+    free(b->counts);
+    free(b->rows.ptr);
+    free(b->rows.column);
+    free(b->rows.value);
+    free(b->rows.mode);
+    b->counts = NULL;
+    b->rows = (spread_rows){0};
 }
 
 /* All rows have come. */
@@ -275,41 +364,37 @@ static void make_system(group *g, body *b)
     for (int k = 0; k < g->size; k++)
         first[k + 1] = first[k] + b->count[k] / b->bs;
     b->rows.first = first;
+    b->rows.ptr = new_zeros(b->here + 1, sizeof *b->rows.ptr);
+    for (PetscInt i = 0; i < b->here; i++)
+        b->rows.ptr[i + 1] = b->rows.ptr[i] + b->counts[i];
+    if (b->rows.ptr[b->here] != b->blocks)
+        end_group("other rows than were told of");
     system_create(&b->system, &b->rows);
     b->made[VARIANT_WHOLE] = true;
     free(first);
-    free_rows(&b->rows);
+    free_rows(b);
     tell_made(g, b, VARIANT_WHOLE, start);
 }
 
 static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
 {
     body *b = find(g, m->id);
-    const PetscInt nodes = (PetscInt)m->a, blocks = (PetscInt)m->b, bs = b->bs, of = nodes * bs * b->modes;
-    const PetscMPIInt owner = (PetscMPIInt)m->c;
-    const size_t bytes = bytes_of_rows(b, m);
+    size_t size[ROWS_PARTS];
+    void *to[ROWS_PARTS];
+    MPI_Request request[ROWS_PARTS];
     PetscFunctionBeginUser;
-    PetscCheck(owner >= 0 && owner < g->size, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "rows for process %d", owner);
-    b->arrived += nodes;
-    if (owner != 0 && IS_FIRST(g))
-        send_to(owner, g->whole, bytes);
-    else if (owner != 0 && g->rank == owner)
-        receive(need_room(g, bytes), bytes);
-    if (g->rank == owner) {
-        const int64_t at = b->rows.ptr[b->filled], size = (int64_t)bs * bs;
-        const double *value = g->whole;
-        const int32_t *count = (const int32_t *)(value + blocks * size), *column = count + nodes;
-        const float *mode = (const float *)(column + blocks);
-        PetscCheck(b->filled + nodes <= b->here && at + blocks <= b->blocks, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-                   "more rows than were told of");
-        memcpy(b->rows.column + at, column, (size_t)blocks * sizeof *column);
-        memcpy(b->rows.value + at * size, value, (size_t)(blocks * size) * sizeof *value);
-        memcpy(b->rows.mode + b->filled * bs * b->modes, mode, (size_t)of * sizeof *mode);
-        for (PetscInt i = 0; i < nodes; i++, b->filled++)
-            b->rows.ptr[b->filled + 1] = b->rows.ptr[b->filled] + count[i];
+    if (m->c != 0 && g->rank == m->c) {
+        bytes_of_rows(size, b, m);
+        place_rows(to, b, m);
+        for (int k = 0; k < ROWS_PARTS; k++)
+            start_receive(&request[k], to[k], size[k]);
+        wait_for(ROWS_PARTS, request);
     }
-    if (b->arrived == b->nodes)
+    b->arrived += (PetscInt)m->a;
+    if (b->arrived == b->nodes) {
+        free_letters(g);
         make_system(g, b);
+    }
     PetscFunctionReturn(0);
 }
 
@@ -317,7 +402,7 @@ static PetscErrorCode free_body(body *b)
 {
     PetscFunctionBeginUser;
     system_free(&b->system);
-    free_rows(&b->rows);
+    free_rows(b);
     PetscCall(PetscFree2(b->count, b->first));
     *b = (body){.id = 0};
     PetscFunctionReturn(0);
@@ -459,9 +544,8 @@ static PetscErrorCode hear(group *g, uz_wire_head *m)
     PetscFunctionBeginUser;
     if (IS_FIRST(g) && !stream_read(g->stream, m, sizeof *m))
         m->kind = 0;
-    const size_t behind = IS_FIRST(g) && m->kind != 0 ? bytes_behind(g, m) : 0;
-    if (behind > 0)
-        take(g, need_room(g, behind), behind);
+    if (IS_FIRST(g) && m->kind != 0)
+        read_behind(g, m);
     PetscCallMPI(MPI_Ibcast(m, (int)sizeof *m, MPI_BYTE, 0, PETSC_COMM_WORLD, &request));
     wait_for(1, &request);
     PetscFunctionReturn(0);
@@ -482,6 +566,7 @@ static PetscErrorCode serve(group *g)
     for (int k = 0; k < UZ_WIRE_BODIES; k++)
         if (g->body[k].id)
             PetscCall(free_body(&g->body[k]));
+    free_letters(g);
     free(g->whole);
     PetscFunctionReturn(0);
 }

@@ -15,7 +15,8 @@
 
 /* For any process alone. */
 void end_group(const char *why);
-void *new_zeros(int64_t count, size_t size); /* zeros */
+void *new_room(int64_t count, size_t size); /* uninitialized */
+void *new_zeros(int64_t count, size_t size);
 /* MPI_Waitall, asleep where it takes long. Nothing else waits: no call of MPI's that does is made. */
 void wait_for(int count, MPI_Request *requests);
 
