@@ -24,7 +24,7 @@ typedef struct {
 typedef struct {
     const neighbours *of;
     int64_t from, to;
-    int64_t *seen; /* n_nodes: 1 + the last node whose neighbours it was counted among */
+    int32_t *seen; /* n_nodes: 1 + the last node whose neighbours it was counted among */
     int64_t *near; /* neighbours of the node at hand, itself included */
     int64_t n_near;
     int32_t *rows; /* their free dofs */
@@ -39,7 +39,7 @@ static void find_near(walk *w, int64_t a, bool ascending)
             const int64_t other = mesh->node[k];
             if (w->seen[other] == a + 1)
                 continue;
-            w->seen[other] = a + 1;
+            w->seen[other] = (int32_t)(a + 1);
             int64_t at = w->n_near++;
             for (; ascending && at > 0 && w->near[at - 1] > other; at--) /* it is short, and mostly comes in order */
                 w->near[at] = w->near[at - 1];
@@ -142,14 +142,22 @@ static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, int64_t **pt
                    (long long)entries);
 }
 
-enum { WORTH_SHARING = 20000 }; /* nodes */
+/* Nodes; and parts for each thread: pages that are touched here first cost some threads several times what they cost
+ * others. */
+enum { WORTH_SHARING = 20000, PARTS_EACH = 4, PARTS_MOST = 2 * UZ_ASIDE_MOST };
+
+static int count_parts(int64_t nodes)
+{
+    const int threads = nodes < WORTH_SHARING ? 1 : uz_aside_threads(), parts = PARTS_EACH * threads;
+    return threads == 1 ? 1 : parts < PARTS_MOST ? parts : PARTS_MOST;
+}
 
 /* The columns of parts of the nodes. most: neighbours of a node. */
 static uz_status walk_columns(uz_body_model *model, neighbours *n, int64_t most, uz_error *err)
 {
     const int64_t nodes = model->mesh.n_nodes;
-    const int parts = nodes < WORTH_SHARING ? 1 : uz_aside_threads();
-    walk walks[UZ_ASIDE_MOST] = {{0}};
+    const int parts = count_parts(nodes);
+    walk walks[PARTS_MOST] = {{0}};
     uz_status status = UZ_OK;
     for (int p = 0; p < parts; p++) {
         walk *w = &walks[p];
