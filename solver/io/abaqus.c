@@ -367,7 +367,7 @@ static uz_status check_nodes(const abaqus_file *file)
 }
 
 /* new_element (elements): the numbers of those of the body, -1: others. */
-static uz_status add_body(uz_given_mesh *out, const abaqus_file *file, int64_t *new_element)
+static uz_status add_body(uz_given_mesh *out, abaqus_file *file, int64_t *new_element)
 {
     int64_t places = 0;
     for (int64_t e = 0; e < file->elements.count; e++) {
@@ -378,7 +378,7 @@ static uz_status add_body(uz_given_mesh *out, const abaqus_file *file, int64_t *
     }
     out->n_nodes = file->nodes.count;
     out->from_file = "/mesh/abaqus";
-    if (!uz_given_room(out, file->xyz, places))
+    if (!uz_given_room(out, &file->xyz, places))
         return abaqus_no_memory(&file->text);
     for (int64_t e = 0; e < file->elements.count; e++) {
         const int64_t to = new_element[e];

@@ -128,7 +128,7 @@ static uz_status choose_dim(int *dim, int64_t *line, const cells *mesh, const ch
 }
 
 /* new_cell: the number of each cell among the elements, -1: it is none. */
-static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_cell)
+static uz_status add_body(uz_given_mesh *out, cells *mesh, int64_t *new_cell)
 {
     int64_t places = 0;
     for (int64_t e = 0; e < mesh->n_cells; e++) {
@@ -137,7 +137,7 @@ static uz_status add_body(uz_given_mesh *out, const cells *mesh, int64_t *new_ce
         places += body ? mesh->first[e + 1] - mesh->first[e] : 0;
     }
     out->n_nodes = mesh->n_nodes;
-    if (!uz_given_room(out, mesh->xyz, places))
+    if (!uz_given_room(out, &mesh->xyz, places))
         return uz_no_memory(mesh->err, "the mesh");
     for (int64_t e = 0; e < mesh->n_cells; e++) {
         const int64_t to = new_cell[e], count = mesh->first[e + 1] - mesh->first[e];
@@ -210,7 +210,7 @@ static uz_status add_groups(uz_given_mesh *out, const cells *mesh, const int64_t
     return UZ_OK;
 }
 
-uz_status cells_to_given(uz_given_mesh *out, const cells *mesh, const char *from_file, const char *advice)
+uz_status cells_to_given(uz_given_mesh *out, cells *mesh, const char *from_file, const char *advice)
 {
     int64_t *new_cell = uz_alloc(mesh->n_cells, sizeof *new_cell), line = 1;
     memset(out, 0, sizeof *out);

@@ -43,8 +43,9 @@ uz_status cells_add_values(cells *mesh, const char *name, const int64_t *value, 
 
 /* The cells of the highest dimension are the body; of sets those are elements, cells of one dimension less are sides,
  * of others their nodes are taken. What is named alike in two ways is NAME (elements before sides before nodes), then
- * NAME.sides, NAME.nodes. Surfaces in space are refused with `advice`. *out is empty on failure. */
-uz_status cells_to_given(uz_given_mesh *out, const cells *mesh, const char *from_file, const char *advice);
+ * NAME.sides, NAME.nodes. Surfaces in space are refused with `advice`. *out is empty on failure;
+ * coordinates in space are moved to it. */
+uz_status cells_to_given(uz_given_mesh *out, cells *mesh, const char *from_file, const char *advice);
 void cells_clear(cells *mesh);
 
 #endif

@@ -186,6 +186,31 @@ static uz_status choose_dim(int *dim, const gmsh_file *file)
     return UZ_OK;
 }
 
+/* The body's elements where all of the file stand, which is read no more. */
+static uz_status move_elements(uz_given_mesh *out, gmsh_file *file, int64_t places, const int64_t *new_element)
+{
+    int64_t at = 0, node[UZ_ELEMENT_NODES];
+    for (int64_t e = 0, done = 0; e < file->n_elements; e++) {
+        if (new_element[e] < done)
+            continue; /* no element of the body, or repeated */
+        const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
+        const uz_element_type *type = uz_element_type_of(kind);
+        for (int i = 0; i < type->nodes; i++)
+            node[i] = file->node[file->first[e] + (type->gmsh_node ? type->gmsh_node[i] : i)];
+        memcpy(file->node + at, node, (size_t)type->nodes * sizeof *node);
+        at += type->nodes;
+        out->kind[done++] = (unsigned char)kind;
+        out->first[done] = at;
+    }
+    int64_t *own = uz_realloc(file->node, places, sizeof *own);
+    if (!own)
+        return gmsh_no_memory(file);
+    file->node = NULL;
+    free(out->node);
+    out->node = own;
+    return UZ_OK;
+}
+
 static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
 {
     int dim = 0;
@@ -214,27 +239,17 @@ static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
     out->dim = dim;
     out->n_nodes = file->n_nodes;
     out->from_file = "/mesh/gmsh";
-    if (!uz_given_room(out, file->xyz, places))
+    status = make_groups(out, file, dim, new_element);
+    if (status == UZ_OK && !uz_given_room(out, &file->xyz, 0))
         status = gmsh_no_memory(file);
-    for (int64_t e = 0, done = 0, at = 0; status == UZ_OK && e < file->n_elements; e++) {
-        if (new_element[e] < done)
-            continue; /* no element of the body, or repeated */
-        const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
-        const uz_element_type *type = uz_element_type_of(kind);
-        for (int i = 0; i < type->nodes; i++)
-            out->node[at + i] = file->node[file->first[e] + (type->gmsh_node ? type->gmsh_node[i] : i)];
-        at += file->first[e + 1] - file->first[e];
-        out->kind[done++] = (unsigned char)kind;
-        out->first[done] = at;
-    }
+    if (status == UZ_OK)
+        status = move_elements(out, file, places, new_element);
+    free(new_element);
     if (status == UZ_OK && dim == 2 && !uz_given_is_flat(out, file->xyz))
         status = gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
                               "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
                               "modelled: mesh the volume (and save it: as a physical volume, or with Mesh.SaveAll), or "
                               "turn a plane body into the plane of x and y");
-    if (status == UZ_OK)
-        status = make_groups(out, file, dim, new_element);
-    free(new_element);
     return status;
 }
 

@@ -138,15 +138,19 @@ uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
     return status;
 }
 
-bool uz_given_room(uz_given_mesh *given, const double *xyz, int64_t places)
+bool uz_given_room(uz_given_mesh *given, double **xyz, int64_t places)
 {
     const int dim = given->dim;
-    given->xyz = uz_alloc(given->n_nodes * dim, sizeof *given->xyz);
+    double *room =
+        dim == 3 ? uz_realloc(*xyz, given->n_nodes * dim, sizeof *room) : uz_alloc(given->n_nodes * dim, sizeof *room);
+    if (dim == 3 && room)
+        *xyz = NULL;
+    for (int64_t i = 0; dim < 3 && room && i < given->n_nodes; i++)
+        memcpy(room + i * dim, *xyz + 3 * i, (size_t)dim * sizeof *room);
+    given->xyz = room;
     given->kind = uz_alloc(given->n_elements, sizeof *given->kind);
     given->first = uz_alloc_zero(given->n_elements + 1, sizeof *given->first);
     given->node = uz_alloc(places, sizeof *given->node);
-    for (int64_t i = 0; given->xyz && i < given->n_nodes; i++)
-        memcpy(given->xyz + i * dim, xyz + 3 * i, (size_t)dim * sizeof *xyz);
     return given->xyz && given->kind && given->first && given->node;
 }
 

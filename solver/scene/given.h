@@ -10,8 +10,9 @@ enum { UZ_POINTER = 96 };
 #define UZ_MESH_MAX_GROUPS 4096
 
 /* Room for a body whose dim, n_nodes and n_elements are there, with `places` nodes of elements in all; its coordinates
- * are the first of xyz (n_nodes x 3), and first[0] is 0. False: no memory. */
-bool uz_given_room(uz_given_mesh *given, const double *xyz, int64_t places);
+ * are the first of *xyz (n_nodes x 3, of malloc), which becomes its own where they are all, and first[0] is 0. False:
+ * no memory. */
+bool uz_given_room(uz_given_mesh *given, double **xyz, int64_t places);
 /* Do all nodes of elements lie in one plane z = constant, but for rounding? xyz: n_nodes x 3. */
 bool uz_given_is_flat(const uz_given_mesh *given, const double *xyz);
 
