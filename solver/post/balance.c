@@ -123,28 +123,13 @@ static uz_status add_springs(balance *b, uz_error *err)
     return status;
 }
 
-/* Which supports hold each node, in the scene's order. */
-static uz_status list_supports(balance *b, uz_error *err)
-{
-    const uz_mesh *mesh = &b->model->mesh;
-    uz_entries all = {.n = 0};
-    for (int64_t s = 0; s < b->scene->n_supports; s++) {
-        const uz_support *support = &b->scene->supports[s];
-        const uz_group *group = support->kind == UZ_SUPPORT_SPRING ? NULL : uz_mesh_group(mesh, support->on, "", NULL);
-        for (int64_t i = 0; group && i < uz_group_node_count(mesh, group); i++) {
-            const int64_t a = uz_group_node_at(group, i);
-            uz_entries_add(&all, s, a, 0);
-            b->held[a] = true;
-        }
-    }
-    return uz_csc_from_entries(&b->supports, b->scene->n_supports, mesh->n_nodes, &all, err);
-}
-
 static void find_wanted(void *ctx, int64_t begin, int64_t end)
 {
     const balance *b = ctx;
-    for (int64_t a = begin; a < end; a++)
+    for (int64_t a = begin; a < end; a++) {
+        b->held[a] = b->supports.ptr[a] < b->supports.ptr[a + 1];
         b->wanted[a] = b->held[a] || uz_mesh_hangs(&b->model->mesh, a) || uz_is_tied(b->model, a);
+    }
 }
 
 enum { AT_ONCE = 2048, PART = 64 }; /* elements */
@@ -283,73 +268,25 @@ static void leave_tied(balance *b)
     }
 }
 
-/* Directions that supports hold at a node: d = q R with orthonormal q. */
-typedef struct {
-    int n;
-    int64_t support[DIM];
-    double d[DIM][DIM], q[DIM][DIM], R[DIM][DIM];
-} held_directions;
-
-static void hold(held_directions *h, int64_t support, const double d[DIM])
-{
-    double rest[DIM] = {d[0], d[1], d[2]}, along[DIM] = {0};
-    for (int pass = 0; pass < 2; pass++) /* twice: orthogonal to rounding (Giraud et al., Numer. Math. 101 (2005) 87) */
-        for (int i = 0; i < h->n; i++) {
-            const double s = rest[0] * h->q[i][0] + rest[1] * h->q[i][1] + rest[2] * h->q[i][2];
-            along[i] += s;
-            for (int c = 0; c < DIM; c++)
-                rest[c] -= s * h->q[i][c];
-        }
-    const double length = sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
-    if (h->n == DIM || length <= UZ_DEPENDENT)
-        return;
-    for (int i = 0; i < h->n; i++)
-        h->R[i][h->n] = along[i];
-    h->R[h->n][h->n] = length;
-    h->support[h->n] = support;
-    for (int c = 0; c < DIM; c++) {
-        h->d[h->n][c] = d[c];
-        h->q[h->n][c] = rest[c] / length;
-    }
-    h->n++;
-}
-
 /* What the supports do at a node, each along its own directions; what is left over is the residual of free dofs. */
 static void add_reaction(balance *b, int64_t node)
 {
-    held_directions h = {.n = 0};
-    double R[DIM] = {0}, a[DIM] = {0};
+    const int64_t first = b->supports.ptr[node], count = b->supports.ptr[node + 1] - first;
+    const uz_rigid_group *rigid = uz_rigid_group_of(b->model, node);
+    double R[DIM] = {0}, share[DIM];
     for (int c = 0; c < b->dim; c++) {
         const int64_t i = node * b->dim + c;
         R[c] = b->inner[i] - b->load[i] - b->contact[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
     }
-    const uz_rigid_group *rigid = uz_rigid_group_of(b->model, node);
-    if (rigid)
+    if (rigid) {
         add_force(b, &b->out->supports[rigid->support], node, R);
-    for (int64_t i = b->supports.ptr[node]; i < b->supports.ptr[node + 1] && !rigid; i++) {
-        const int64_t s = b->supports.idx[i];
-        const uz_support *support = &b->scene->supports[s];
-        double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
-        if (uz_support_is_inclined(n, support, b->dim)) {
-            hold(&h, s, n);
-            continue;
-        }
-        uz_support_values(u, support, b->dim);
-        for (int c = 0; c < b->dim; c++) {
-            const double axis[DIM] = {c == 0, c == 1, c == 2};
-            if (!isnan(u[c]))
-                hold(&h, s, axis);
-        }
+        return;
     }
-    for (int i = h.n - 1; i >= 0; i--) {
+    uz_held_share(share, b->scene, b->dim, b->supports.idx + first, count, R);
+    for (int64_t i = first; i < first + count; i++) {
         double f[DIM];
-        a[i] = R[0] * h.q[i][0] + R[1] * h.q[i][1] + R[2] * h.q[i][2];
-        for (int j = i + 1; j < h.n; j++)
-            a[i] -= h.R[i][j] * a[j];
-        a[i] /= h.R[i][i];
-        for (int c = 0; c < DIM; c++)
-            f[c] = a[i] * h.d[i][c];
-        add_force(b, &b->out->supports[h.support[i]], node, f);
+        uz_held_part(f, &b->scene->supports[b->supports.idx[i]], b->dim, share);
+        add_force(b, &b->out->supports[b->supports.idx[i]], node, f);
     }
 }
 
@@ -455,7 +392,7 @@ static bool make_room(balance *b, int64_t n)
     b->load = uz_alloc_zero(n * b->dim, sizeof *b->load);
     b->contact = uz_alloc_zero(n * b->dim, sizeof *b->contact);
     b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
-    b->held = uz_alloc_zero(n, sizeof *b->held);
+    b->held = uz_alloc(n, sizeof *b->held);
     b->wanted = uz_alloc(n, sizeof *b->wanted);
     return b->load && b->contact && b->inner && b->held && b->wanted;
 }
@@ -503,7 +440,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         add_force(&b, &out->loads, a, f);
     }
     if (status == UZ_OK)
-        status = list_supports(&b, err);
+        status = uz_list_held(&b.supports, &model->mesh, scene, err);
     if (status == UZ_OK)
         uz_by_pieces(find_wanted, &b, n);
     if (status == UZ_OK && known)

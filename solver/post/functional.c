@@ -19,6 +19,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "obstacle/obstacle.h"
+#include "post/parts.h"
 
 #include <float.h>
 #include <math.h>
@@ -351,10 +352,10 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
 /* ---- supports */
 
 /* The same of a rigid group: its force goes with the translation. */
-static void take_translation(const making *k, const uz_support *support, bool asked)
+static void take_translation(const making *k, const uz_support *support)
 {
     const uz_body_model *model = k->model;
-    for (int64_t g = 0; g < model->n_rigid && asked; g++)
+    for (int64_t g = 0; g < model->n_rigid; g++)
         for (int c = 0; c < k->dim; c++) {
             const int64_t dof = model->dof[model->rigid[g].anchor[0] * k->dim + c];
             if (&k->scene->supports[model->rigid[g].support] == support && dof < 0 && dof != UZ_NO_DOF)
@@ -362,33 +363,30 @@ static void take_translation(const making *k, const uz_support *support, bool as
         }
 }
 
-/* held becomes the direction on the dofs that the support holds and none before it did. */
-static void take_directions(const making *k, const uz_support *support, const uz_group *group, bool asked, bool *taken)
+static bool is_asked(const making *k, int64_t support)
 {
-    const int dim = k->dim;
-    double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
-    const bool inclined = uz_support_is_inclined(n, support, dim);
-    if (!inclined)
-        uz_support_values(u, support, dim);
-    if (support->kind == UZ_SUPPORT_RIGID) {
-        take_translation(k, support, asked);
+    return strcmp(k->scene->supports[support].on, k->quantity->on) == 0;
+}
+
+/* held becomes, on the dofs of a node that supports hold, what the force there has in the one that is asked for. */
+static void take_share(const making *k, const uz_csc *supports, int64_t node)
+{
+    const int64_t first = supports->ptr[node], count = supports->ptr[node + 1] - first;
+    double sum[DIM] = {0}, part[DIM];
+    if (uz_is_rigid(k->model, node))
         return;
+    for (int64_t i = first; i < first + count; i++) {
+        if (!is_asked(k, supports->idx[i]))
+            continue;
+        uz_held_part(part, &k->scene->supports[supports->idx[i]], k->dim, k->quantity->direction);
+        for (int c = 0; c < DIM; c++)
+            sum[c] += part[c];
     }
-    for (int64_t i = 0; i < uz_group_node_count(&k->model->mesh, group) * dim * dim; i++) {
-        const int64_t node = uz_group_node_at(group, i / (dim * dim)), dof = k->model->dof[node * dim + i / dim % dim];
-        const int c = (int)(i % dim), of = (int)(i / dim % dim);
-        double e[DIM] = {c == 0, c == 1, c == 2}, along, value = 0;
-        if (dof >= 0 || dof == UZ_NO_DOF || uz_is_rigid(k->model, node) || taken[-1 - dof] ||
-            (inclined ? c > 0 : isnan(u[c])))
-            continue;
-        along = uz_along_dof(k->model, node, of, inclined ? n : e);
-        if (fabs(along) < 0.7) /* it is another support's */
-            continue;
-        for (int j = 0; j < dim; j++)
-            value += (inclined ? n : e)[j] * k->quantity->direction[j];
-        taken[-1 - dof] = true;
-        if (asked)
-            k->out->held[-1 - dof] = along * value;
+    uz_held_share(sum, k->scene, k->dim, supports->idx + first, count, sum);
+    for (int c = 0; c < k->dim; c++) {
+        const int64_t dof = k->model->dof[node * k->dim + c];
+        if (dof < 0 && dof != UZ_NO_DOF)
+            k->out->held[-1 - dof] = uz_along_dof(k->model, node, c, sum);
     }
 }
 
@@ -429,20 +427,24 @@ static uz_status take_reaction(const making *k, uz_error *err)
     const uz_scene *scene = k->scene;
     const uz_evaluation *known = k->answer->evaluation;
     const int64_t n_nodes = k->model->mesh.n_nodes;
-    bool *taken = uz_alloc_zero(k->model->n_fixed, sizeof *taken), springs = false, holds = false;
+    bool springs = false, holds = false;
+    uz_csc supports = {.ptr = NULL};
     double *share = uz_alloc(n_nodes, sizeof *share);
-    uz_status status = UZ_OK;
-    if (!taken || !share)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    uz_status status = share ? uz_list_held(&supports, &k->model->mesh, scene, err)
+                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    for (int64_t a = 0; a < n_nodes && status == UZ_OK; a++)
+        take_share(k, &supports, a);
     for (int64_t s = 0; s < scene->n_supports && status == UZ_OK; s++) {
         const uz_support *support = &scene->supports[s];
-        const bool asked = strcmp(support->on, k->quantity->on) == 0, spring = support->kind == UZ_SUPPORT_SPRING;
+        const bool spring = support->kind == UZ_SUPPORT_SPRING;
         const uz_group *group = uz_mesh_group(&k->model->mesh, support->on, "/supports", err);
         if (!group)
             status = UZ_ERR_SCENE;
-        else if (!spring)
-            take_directions(k, support, group, asked, taken);
-        else if (asked) { /* their forces are displacements */
+        if (!group || !is_asked(k, s))
+            continue;
+        if (support->kind == UZ_SUPPORT_RIGID)
+            take_translation(k, support);
+        if (spring) { /* their forces are displacements */
             memset(share, 0, (size_t)n_nodes * sizeof *share);
             status = uz_spread_over_group(share, k->model, group, true, k->where, err);
             for (int64_t i = 0; i < n_nodes * k->dim && status == UZ_OK; i++) {
@@ -451,9 +453,9 @@ static uz_status take_reaction(const making *k, uz_error *err)
                     k->out->load[i] -= fmax(0, share[i / k->dim]) * support->spring[c] * k->quantity->direction[c];
             }
         }
-        springs = springs || (asked && spring);
-        holds = holds || (asked && !spring);
-        for (int c = 0; c < k->dim && asked; c++)
+        springs = springs || spring;
+        holds = holds || !spring;
+        for (int c = 0; c < k->dim; c++)
             k->out->found += known->supports[s].force[c] * k->quantity->direction[c];
     }
     if (status == UZ_OK && springs && holds)
@@ -461,7 +463,7 @@ static uz_status take_reaction(const making *k, uz_error *err)
     if (status == UZ_OK && holds)
         status = keep_contacts(k, err);
     k->out->times = springs ? 1 : -1;
-    free(taken);
+    uz_csc_clear(&supports);
     free(share);
     return status;
 }

@@ -76,4 +76,13 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
  * pressure is found exactly and none lies outside of those of the rows. UZ_ERR_MEMORY, _SCENE. */
 uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_scene *scene, const double *pressure,
                             uz_error *err);
+
+/* *out: n_supports x n_nodes, by columns: which supports, springs left out, hold each node. The caller clears it. */
+uz_status uz_list_held(uz_csc *out, const uz_mesh *mesh, const uz_scene *scene, uz_error *err);
+/* Where these supports hold a node, none of a rigid group, each does uz_held_part of uz_held_share of the force v there
+ * (held.c). Both are symmetric matrices times v: the first is the sum of d d' over the directions that it holds, the
+ * second the pseudo-inverse of their sum over the supports. out may be v. */
+void uz_held_part(double out[3], const uz_support *support, int dim, const double v[3]);
+void uz_held_share(double out[3], const uz_scene *scene, int dim, const int32_t *support, int64_t count,
+                   const double v[3]);
 #endif

@@ -140,6 +140,29 @@ def test_springs_at_nodes_are_those_of_the_body(s):
             check(abs(one["value"] - true) < 0.25 * abs(one["on_this_mesh"] - true) + size, element, one, true)  # the rest is of second order
 
 
+def test_supports_that_meet_share_in_any_order(s):
+    """The one that is named first had all of a corner's force, also as a quantity: -1.1135 or -1.1231 of the same block."""
+    held = {"left": {"ux": 0, "uy": 0}, "bottom": {"ux": 0, "uy": 0}, "leaning": {"normal": [3, -4], "u": 0}}
+    found = []
+    for order in (("left", "bottom"), ("bottom", "left"), ("left", "bottom", "leaning"), ("leaning", "bottom", "left")):
+        groups = {"leaning": {"where": {"x": 0, "y": 0}}} if "leaning" in order else {}
+        summary = solved(s, {"problem": {
+            "kind": "scene", "model": "plane_strain", "kinematics": "fixed", "mesh": {"box": {"size": [2, 1], "cells": [8, 4]}},
+            "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "loads": [{"on": "top", "traction": [1, -2]}],
+            "supports": [{"on": groups.get(name, name), **held[name]} for name in order]},
+            "quantities": [{"quantity": "reaction", "on": "left", "direction": [1, 0]}, {"quantity": "reaction", "on": "left", "direction": [0, 1], "name": "up"}]})
+        forces = {name: one["force"] for name, one in zip(order, summary["resultants"]["supports"])}
+        total = [sum(one[c] for one in forces.values()) for c in range(2)]
+        check(abs(total[0] + 2) < 1e-9 and abs(total[1] - 4) < 1e-9, forces)
+        for c, one in enumerate(summary["quantities"]):
+            check(abs(one["on_this_mesh"] - forces["left"][c]) < 1e-12 and one["low"] < one["value"] < one["high"], one, forces)
+        found.append([(one["low"], one["on_this_mesh"], one["high"]) for one in summary["quantities"]])
+        corner = forces.get("leaning", [0.6, -0.8])
+        check(abs(0.8 * corner[0] + 0.6 * corner[1]) < 1e-12 and abs(corner[0]) > 1e-3, forces)
+    for one, other in (found[:2], found[2:]):
+        check(all(abs(a - b) < 1e-9 for x, y in zip(one, other) for a, b in zip(x, y)), found)
+
+
 def test_facets_of_a_hole_stand_for_its_circle(s):
     """A sector of a plate on a pin too thick for its hole: chords of both circles are alike, and the pin is in none of them."""
     found, turn = [], math.pi / 4
