@@ -638,8 +638,8 @@ void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
 void uz_doubt_unborne(uz_evaluation *out)
 {
     warn_of_mesh(out, 1,
-                 "the same mesh with all elements divided has no stable answer under the whole load, so that nothing "
-                 "says how far off this one is: refine it");
+                 "the same mesh with all elements divided has no stable answer under the whole load, or none was found "
+                 "in as many steps as that is worth, so that nothing says how far off this one is: refine it");
 }
 
 static void look_at_mesh(const doubts *d)

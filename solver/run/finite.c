@@ -27,6 +27,7 @@
 
 /* Parts are doubled after at most FEW contact problems. */
 enum { FEW = 4, MOST_PARTS = 200 };
+#define LEAST_PART (1.0 / 1024)
 /* Orderings and factors of tangents that are kept. */
 #define CACHE_BYTES ((size_t)256 << 20)
 /* Contact problems, which are those of all of u, of which most may be rotation, are solved to the first, and the answer
@@ -231,7 +232,8 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     run->from = path ? path->from : NULL;
     run->near = path && !path->from ? path->near : NULL;
     run->part = path ? path->part : 1;
-    run->least = path && path->least > 0 ? path->least : UZ_LEAST_PART;
+    run->effort = path ? path->effort : (uz_finite_effort){0};
+    run->effort.least = run->effort.least > 0 ? run->effort.least : LEAST_PART;
     const double start = uz_seconds();
     run->hooks = hooks ? *hooks : (uz_hooks){.ctx = NULL};
     run->hooks.begins = NULL;
@@ -338,10 +340,10 @@ static void measure_overlap(uz_finite_run *run)
     }
 }
 
-/* The load that is borne is known to run->least: a part that fails may be twice the smallest. */
+/* The load that is borne is known to run->effort.least: a part that fails may be twice the smallest. */
 static double least_part(const uz_finite_run *run)
 {
-    return run->least * (run->found.load > 0 ? 0.5 * run->found.load : 1);
+    return run->effort.least * (run->found.load > 0 ? 0.5 * run->found.load : 1);
 }
 
 /* The way begins at rest, or where another case has come to. */
@@ -524,11 +526,11 @@ static int64_t last_after(const uz_problem *problem, int64_t i)
 
 /* points: n_cases, those that later cases need. */
 static uz_status solve_case(uz_result **out, uz_finite_point **points, const uz_problem *problem, int64_t i,
-                            const double *near, double least, const uz_settings *settings, const uz_hooks *hooks,
-                            double deadline, uz_error *err)
+                            const double *near, const uz_finite_effort *effort, const uz_settings *settings,
+                            const uz_hooks *hooks, double deadline, uz_error *err)
 {
     const uz_problem one = uz_problem_of_case(problem, i);
-    uz_finite_path path = {.part = 1, .near = near, .least = least};
+    uz_finite_path path = {.part = 1, .near = near, .effort = effort ? *effort : (uz_finite_effort){0}};
     if (problem->n_cases == 0)
         return uz_solve_finite_load(out, &one, settings, hooks, deadline, NULL, &path, err);
     const uz_load_case *own = &problem->cases[i];
@@ -562,7 +564,7 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
     if (status == UZ_OK)
         status = uz_check_finite_settings(settings, err);
     if (status == UZ_OK)
-        status = uz_solve_finite_near(results, problem, settings, NULL, UZ_LEAST_PART, hooks, err);
+        status = uz_solve_finite_near(results, problem, settings, NULL, NULL, hooks, err);
     if (status == UZ_OK)
         status = uz_look_at_few_elements(results, problem, settings, NULL, hooks, started, err);
     for (int64_t i = 0; i < (problem->n_cases > 0 ? problem->n_cases : 1) && status == UZ_OK; i++)
@@ -571,7 +573,8 @@ uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const 
 }
 
 uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                               double *const *near, double least, const uz_hooks *hooks, uz_error *err)
+                               double *const *near, const uz_finite_effort *effort, const uz_hooks *hooks,
+                               uz_error *err)
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
@@ -585,7 +588,7 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
         status =
-            solve_case(&results[i], points, problem, i, near ? near[i] : NULL, least, settings, hooks, deadline, err);
+            solve_case(&results[i], points, problem, i, near ? near[i] : NULL, effort, settings, hooks, deadline, err);
     }
     for (int64_t i = 0; i < n && points; i++)
         uz_finite_point_free(points[i]);

@@ -33,12 +33,15 @@ bool uz_is_finite(const uz_problem *problem);
 uz_status uz_solve_finite(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 /* The same on a mesh of a sequence, whose refining asks for no other. near: displacements by node for each case, from
- * which its whole load is tried first; NULL of a case: none. Cases that are after others begin with these. least: of
- * the parts that a load is put on in, while none of it is borne; UZ_LEAST_PART, or more where what it bears to the last
- * is not asked. */
-#define UZ_LEAST_PART (1.0 / 1024)
+ * which its whole load is tried first; NULL of a case: none. Cases that are after others begin with these. effort: of
+ * each case; NULL: all that it takes. */
+typedef struct {
+    double least; /* of the parts that a load is put on in, while none of it is borne; 0: as small as is worth it */
+    int64_t qps;  /* contact problems, after which it ends as UZ_ITERATION_LIMIT; 0: as many as it takes */
+} uz_finite_effort;
 uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, const uz_settings *settings,
-                               double *const *near, double least, const uz_hooks *hooks, uz_error *err);
+                               double *const *near, const uz_finite_effort *effort, const uz_hooks *hooks,
+                               uz_error *err);
 
 /* Another one: of kinematics AUTO with laws of finite strain. Answers are those of small deformation, of fixed
  * kinematics, where that is not off by more than is tolerable, else those of uz_solve_finite. */
@@ -63,7 +66,7 @@ typedef struct {
     const uz_finite_point *from; /* where it begins; NULL: at rest */
     uz_finite_point **to;        /* where it has come to; NULL: not wanted. The caller frees it */
     const double *near; /* of one from rest: displacements by node, about those of the answer; NULL: not known */
-    double least;       /* as in uz_solve_finite_near; 0: UZ_LEAST_PART */
+    uz_finite_effort effort;
 } uz_finite_path;
 void uz_finite_point_free(uz_finite_point *point);
 /* path NULL: the whole load from rest. */
@@ -126,7 +129,8 @@ typedef struct {
     double load;    /* t */
     const uz_finite_point
         *from; /* the way from there, or from rest (NULL) to `part` of the whole is put on in parts t */
-    double part, least;
+    double part;
+    uz_finite_effort effort;
     const double *near; /* n: from where the whole load is tried, until it was; NULL: nowhere but at rest */
     /* n_contacts: how deep nodes of the body at rest stand in the obstacle, which is set back by 1 - t of it, as
      * supports and loads are; 0 until a part of the load is asked for */

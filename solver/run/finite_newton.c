@@ -596,6 +596,17 @@ static uz_part why_stopped(uz_finite_run *run)
     }
 }
 
+/* Before a contact problem; run->stopped says why. */
+static bool has_to_stop(uz_finite_run *run)
+{
+    const bool enough = run->effort.qps > 0 && run->found.qps >= run->effort.qps;
+    const uz_stop stop = {&run->hooks, run->deadline};
+    if (!enough && !uz_stop_is_due(&stop))
+        return false;
+    run->stopped = enough ? UZ_ITERATION_LIMIT : uz_cancelled(&run->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+    return true;
+}
+
 static uz_status keep_reactions(uz_finite_run *run, uz_error *err)
 {
     const int64_t m = run->last->m;
@@ -814,7 +825,6 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
 {
     double before[REMEMBERED] = {0};
     int remembered = 0, in_a_row = 0;
-    const uz_stop stop = {&run->hooks, run->deadline};
     double *to = uz_alloc(run->n, sizeof *to), *begun = uz_alloc(run->n, sizeof *begun),
            *led = uz_alloc(run->n, sizeof *led);
     uz_status status = to && begun && led ? UZ_OK
@@ -838,8 +848,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     }
     while (status == UZ_OK && fits && !done && run->step_qps < MOST_QPS) {
         bool moved = false, found = false, inverted = false;
-        if (uz_stop_is_due(&stop)) {
-            run->stopped = uz_cancelled(&run->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+        if (has_to_stop(run)) {
             *out = UZ_PART_STOPPED;
             break;
         }

@@ -500,7 +500,7 @@ static uz_status solve_large(uz_result **results, const search *g, const uz_prob
             room = (near[i] = g->refines ? uz_carry_nodal(mesh, best->u, best->n_nodes, mesh->dim)
                                          : uz_carry_box(mesh, &g->best.on.box, best->u));
     }
-    uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, UZ_LEAST_PART, g->hooks, err)
+    uz_status status = room ? uz_solve_finite_near(results, problem, settings, near, NULL, g->hooks, err)
                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
     for (int64_t i = 0; i < g->n_cases && status == UZ_OK; i++) { /* on one mesh an answer stays without its estimate */
         double *error = &results[i]->summary.discretization_error;

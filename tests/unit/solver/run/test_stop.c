@@ -1,6 +1,7 @@
 /* not under ThreadSanitizer: one thread, but for one that ends with a lock
  * Solves that are told to stop at any of their questions, on every route: what comes back is the best answer so far,
  * with a bound that holds. */
+#include "body_fixture.h"
 #include "harness.h"
 #include "membrane.h"
 #include "obstacle.h"
@@ -165,6 +166,40 @@ TEST(a_solve_stops_at_any_question_with_a_certified_answer)
 {
     for (int k = 0; k < ROUTES; k++)
         stop_everywhere(&routes[k]);
+}
+
+/* A mesh of few elements is looked at after its answer is there: whoever ends that ends the solve. */
+TEST(a_look_at_few_elements_can_be_stopped)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad4", (double[3]){2, 1, 0}, (int64_t[3]){2, 1, 0});
+    s.materials[0].young = 1;
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_FORCE, "right", 0, -0.01, 0);
+    for (int large = 0; large < 2; large++) {
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s};
+        const uz_settings settings = uz_settings_default();
+        problem.scene.kinematics = large ? UZ_KINEMATICS_FINITE : UZ_KINEMATICS_FIXED;
+        problem.scene.materials[0].law = large ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_LINEAR;
+        pause p = {.began = true, .stop_at = -1};
+        int64_t all = 1;
+        for (int64_t k = 0; k <= all; k++) { /* the first one is not stopped */
+            const uz_hooks hooks = {.ctx = &p, .cancelled = ask};
+            uz_result *result = NULL;
+            uz_error err = {0};
+            p.asked = 0;
+            const uz_status status = uz_solve(&result, &problem, &settings, NULL, &hooks, &err);
+            const bool stopped = p.stop_at >= 0 && p.asked > p.stop_at;
+            CHECK_MSG(stopped ? status == UZ_ERR_CANCELLED || (result && result->summary.outcome == UZ_DISMISSED)
+                              : status == UZ_OK && result->summary.outcome == UZ_CONVERGED,
+                      "large %d: stopped at question %lld of %lld: %s, %s", large, (long long)p.stop_at, (long long)all,
+                      err.message, result ? uz_choice_name(UZ_CHOICE_OUTCOME, result->summary.outcome) : "nothing");
+            all = k == 0 ? p.asked : all;
+            p.stop_at = k;
+            uz_result_free(result);
+        }
+        CHECK(all > 4);
+    }
+    uz_scene_clear(&s);
 }
 
 /* The time of the whole solve is over when the iterations begin. */
