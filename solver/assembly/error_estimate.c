@@ -133,6 +133,10 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 /* What is a translation to that may be strained by a few times as much. */
 #define STRAINED_BY 10
 
+/* Where rows press, in a rotation: what solves leave is then no more than rounding makes of a strain, and more is one.
+ */
+#define ROUNDED (64 * DBL_EPSILON)
+
 /* What supports hold apart by more than this part of their way is no rounding of what they were given. */
 #define APART (4 * DBL_EPSILON)
 
@@ -297,7 +301,7 @@ static bool nothing_strains(const uz_body_model *model, const uz_scene *scene, c
     bool translated = false;
     return is_carried(model, nodal, STRAINED_BY * CARRIED) && !uz_is_loaded(model, scene) &&
            !is_stretched(&translated, model, nodal, false) &&
-           (translated || (alone && is_carried(model, nodal, CARRIED)));
+           (translated || is_carried(model, nodal, alone ? CARRIED : ROUNDED));
 }
 
 double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
