@@ -165,6 +165,19 @@ static uz_status prepare(bool *known, tangent *x, uz_error *err)
     return status;
 }
 
+/* What the loads and reactions at the answer leave of the internal forces on free dofs. */
+static double forces_left(tangent *x)
+{
+    uz_finite_run *run = x->run;
+    const uz_finite_place *at = &run->at;
+    for (int64_t i = 0; i < run->n; i++)
+        x->nodal[i] = at->loads[i] - at->force[i];
+    uz_gather_nodal(run->p, &at->rows, x->nodal);
+    if (run->n_r == at->rows.m)
+        uz_csc_gaxpy_t(run->p, &at->rows.N, 1, run->r);
+    return uz_norm(run->d, run->p);
+}
+
 uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *err)
 {
     const uz_finite_place *at = &run->at;
@@ -197,6 +210,7 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
                                             : !known ? "its tangent has no factor"
                                                      : NULL,
                                      .left = run->certificate.residual * sqrt(2 * at->body.energy),
+                                     .forces = whole && status == UZ_OK ? forces_left(&x) : 0,
                                      .solve = solve,
                                      .energy = energy_of,
                                      .errors = errors_of};

@@ -207,8 +207,9 @@ static uz_status mesh_error(double *error, const uz_finite_run *run, uz_error *e
 {
     const bool known = run->found.steps > 0 || run->from, asked = run->scene.refine;
     *error = NAN;
-    const uz_status status =
-        known ? uz_finite_mesh_error(error, NULL, &run->base, &run->scene, run->free_strain, run->at.u, asked ? err : NULL) : UZ_OK;
+    const uz_status status = known ? uz_finite_mesh_error(error, NULL, &run->base, &run->scene, run->free_strain,
+                                                          run->at.u, asked ? err : NULL)
+                                   : UZ_OK;
     if (status == UZ_OK && known && is_carried(run))
         *error = 0;
     return asked ? status : UZ_OK;

@@ -503,6 +503,8 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
     out->equations = x->work->place
                          ? OF_LARGE * sqrt(2 * fmax(0, norm)) * x->work->place->left
                          : sqrt(2 * fmax(0, norm)) * left->absolute_error + length * left->residual.e1 + rounding_of(x);
+    if (x->work->place && of->times < 0 && !energy) /* a force: z moves what is held, and its norm is no bound */
+        out->equations += length * x->work->place->forces;
     if (x->work->place && energy) /* what is left works along itself, too */
         out->equations += OF_ITSELF * x->work->place->left * x->work->place->left;
     const double half = out->mesh + out->equations;

@@ -10,7 +10,8 @@ typedef struct {
     void *of;
     uz_functional_place place;
     const char *why; /* why no mesh's part can be told; NULL: it can */
-    double left;     /* what the equations leave, in the energy norm */
+    double left;     /* what the equations leave, in the energy norm, */
+    double forces;   /* and of the forces on free dofs: their length */
     /* w (d): K w = load - K_fixed held + N'y with N w = gap at the rows that press, y (m) 0 at others, K the tangent.
      * *solved false: there is none. */
     uz_status (*solve)(void *of, bool *solved, double *w, double *y, const bool *pressing,
