@@ -309,6 +309,7 @@ typedef struct {
     int64_t first, side, number; /* the lowest place and side of a zone, and its number */
     int64_t held, dofs;          /* of its sides' nodes, those of rigid groups being held */
     bool bound;                  /* of a tie: most of it is held, and can't follow */
+    int64_t fixed;               /* dofs of its part of the body that are held */
 } zone_mark;
 
 /* -1, 1; 0: the same but for rounding. */
@@ -318,8 +319,8 @@ static int compare_sizes(double x, double y)
 }
 
 /* What can't follow is last; the smaller one first, which ends on the other, then the softer, then the nearer to the
- * middle of the mesh, then the one of fewer nodes, which is linear: what does not depend on how nodes are numbered, nor
- * on which of them is `on`, nor on the axes. Then the lowest nodes. */
+ * middle of the mesh, then the one of fewer nodes, which is linear, then that of the part which is held less: what does
+ * not depend on how nodes are numbered, nor on which of them is `on`, nor on the axes. Then the lowest nodes. */
 static int by_order(const void *a, const void *b)
 {
     const zone_mark *x = a, *y = b;
@@ -331,6 +332,8 @@ static int by_order(const void *a, const void *b)
         return area ? area : stiffness ? stiffness : away;
     if (x->dofs != y->dofs)
         return x->dofs < y->dofs ? -1 : 1;
+    if (x->fixed != y->fixed)
+        return x->fixed < y->fixed ? -1 : 1;
     return x->first != y->first ? (x->first > y->first) - (x->first < y->first)
                                 : (x->side > y->side) - (x->side < y->side);
 }
@@ -378,14 +381,54 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
     }
 }
 
+/* What holds the parts of the body that zones are of: it tells equal ones that are shifted against each other, as a
+ * half turn makes one of the other. False: no memory. */
+static bool measure_parts(zone_mark *mark, int64_t count, const int64_t *zone, const uz_mortar_pair *pair)
+{
+    const uz_body_model *model = pair->in->model;
+    const uz_mesh *mesh = &model->mesh;
+    int64_t *part = uz_alloc(mesh->n_nodes, sizeof *part), *of_zone = uz_alloc(count, sizeof *of_zone);
+    const bool room = part && of_zone && uz_mesh_number_parts(part, mesh) >= 0;
+    for (int64_t i = 0; i < pair->surface.n && room; i++)
+        of_zone[zone[i]] = part[pair->surface.side[i].node[0]];
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && room; i++) {
+        const int64_t a = i / mesh->dim;
+        if (model->dof[i] >= 0 && !uz_is_rigid(model, a))
+            continue;
+        for (int64_t z = 0; z < count; z++)
+            mark[z].fixed += of_zone[z] == part[a];
+    }
+    free(part);
+    free(of_zone);
+    return room;
+}
+
+/* Do only numbers tell some of them? */
+static bool are_alike(const zone_mark *mark, int64_t count)
+{
+    bool alike = false;
+    for (int64_t z = 1; z < count && !alike; z++) {
+        zone_mark last = mark[z - 1];
+        last.first = mark[z].first;
+        last.side = mark[z].side;
+        alike = by_order(&last, &mark[z]) == 0;
+    }
+    return alike;
+}
+
 /* Zones are numbered by their order. bound: of each, as of its mark. False: no memory. */
 static bool order_zones(int64_t *zone, bool *bound, int64_t count, const uz_mortar_pair *pair)
 {
     zone_mark *mark = uz_alloc(count, sizeof *mark);
     int64_t *number = uz_alloc(count, sizeof *number);
-    const bool room = mark && number;
+    bool room = mark && number;
     if (room) {
         measure_zones(mark, count, zone, pair);
+        qsort(mark, (size_t)count, sizeof *mark, by_order);
+    }
+    if (room && count > 1 && mark[0].area > 0 && are_alike(mark, count)) {
+        measure_zones(mark, count, zone, pair);
+        room = measure_parts(mark, count, zone, pair);
         qsort(mark, (size_t)count, sizeof *mark, by_order);
     }
     for (int64_t z = 0; z < count && room; z++) {

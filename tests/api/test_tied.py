@@ -246,6 +246,25 @@ def test_the_order_of_parts_changes_nothing(s):
         check(abs(energy(kind, (1, 10), False, 1, True) / energy("quad8", (1, 10), False, 3, True) - 1) < off, kind)
 
 
+def test_equal_blocks_that_are_shifted(s):
+    """A half turn makes one mesh of the other, and what holds them tells them apart: numbers of nodes did, by 0.5 % of the energy."""
+    for tied, kind in itertools.product((True, False), ("tri3", "quad4", "quad8")):
+        found = []
+        for order, turned in itertools.product(([0, 1], [1, 0]), (0, 0.7)):
+            def place(dx, dy):
+                return lambda x, y: ((2 * x + dx) * math.cos(turned) - (y + dy) * math.sin(turned), (2 * x + dx) * math.sin(turned) + (y + dy) * math.cos(turned))
+            places = [place(0, 0), place(0.37, 1)]
+            low, high = order.index(0), order.index(1)
+            load = [0.1 * math.cos(turned) + 0.5 * math.sin(turned), 0.1 * math.sin(turned) - 0.5 * math.cos(turned)]
+            groups = {"base": [(low, "bottom")], "under": [(low, "top")], "over": [(high, "bottom")], "lid": [(high, "top")]}
+            join = {"ties": [{"on": "over", "to": "under"}]} if tied else {"contacts": [{"on": "over", "with": "under"}]}
+            held = [] if tied else [{"on": "lid", "normal": [math.cos(turned), math.sin(turned)], "u": 0.01}]
+            request = body([kind] * 2, [[6, 3]] * 2, [places[k] for k in order], groups, model="plane_strain", kinematics="fixed", loads=[{"on": "lid", "traction": load}],
+                           materials=[{"on": "all", "young": 100, "poisson": 0.3}], supports=[{"on": "base", "ux": 0, "uy": 0}, *held], **join)
+            found.append(s.solve(request)["summary"]["energy"]["potential"])
+        check(max(found) - min(found) < 1e-8 * abs(found[0]), tied, kind, found)
+
+
 def test_a_linear_side_beside_a_quadratic_one_that_is_as_fine(s):
     """Of two bodies that are alike but for their elements: which side followed the other depended on the numbers of their nodes."""
     found = set()
