@@ -39,9 +39,10 @@ static uz_status choose_rows(uz_finite_run *run, uz_error *err)
 {
     const uz_body_model *rows = &run->at.rows;
     uz_candidates near, *kept = &run->kept;
-    if (run->pairs || rows->m <= FEW_ROWS || kept->m != rows->m)
+    const bool all = run->pairs || run->follows || rows->m <= FEW_ROWS; /* uz_finite_correct is about all rows */
+    if (all || kept->m != rows->m)
         take_all(run);
-    if (run->pairs || rows->m <= FEW_ROWS)
+    if (all)
         return UZ_OK;
     const bool next = run->step_qps > 0 && run->last->m == rows->m;
     const uz_status status =
