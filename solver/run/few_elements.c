@@ -373,7 +373,8 @@ static uz_status look_closer(uz_result **results, finer *f, const uz_problem *pr
     for (int64_t i = 0; there && i < n && status == UZ_OK; i++)
         stopped = stopped || (there[i] && there[i]->summary.outcome == UZ_DISMISSED);
     for (int64_t i = 0; i < n && stopped; i++)
-        dismiss(&results[i]->summary);
+        if (!uz_has_no_answer(&results[i]->summary) && is_whole(&results[i]->summary))
+            dismiss(&results[i]->summary);
     uz_results_free(there, there ? n : 0);
     if (status != UZ_OK && status != UZ_ERR_MEMORY) {
         uz_error_reset(err);

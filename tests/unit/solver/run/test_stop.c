@@ -202,6 +202,39 @@ TEST(a_look_at_few_elements_can_be_stopped)
     uz_scene_clear(&s);
 }
 
+/* Of two cases the second one bears a part of its load: that was so before the look, and stays what is told of it. */
+TEST(a_look_that_is_stopped_leaves_cases_that_had_no_answer)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad4", (double[3]){2, 1, 0}, (int64_t[3]){2, 1, 0});
+    s.kinematics = UZ_KINEMATICS_FINITE;
+    s.materials[0].young = 1;
+    s.materials[0].law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF;
+    body_hold(&s, "left", 0, 0, NAN);
+    body_load(&s, UZ_LOAD_FORCE, "right", -0.01, 0, 0);
+    uz_load_case cases[] = {{.name = "little"}, {.name = "much", .part = 200, .has_part = true}};
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s, .cases = cases, .n_cases = 2};
+    const uz_settings settings = uz_settings_default();
+    pause p = {.began = true, .stop_at = -1};
+    const uz_hooks hooks = {.ctx = &p, .cancelled = ask};
+    uz_outcome of_much = UZ_CONVERGED;
+    for (int stops = 0; stops < 2; stops++) {
+        uz_result **r = NULL;
+        uz_error err = {0};
+        p.asked = 0;
+        const uz_status status = uz_solve_cases(&r, &problem, &settings, NULL, NULL, &hooks, &err);
+        CHECK_MSG(status == UZ_OK, "%s", err.message);
+        if (status != UZ_OK)
+            break;
+        CHECK_INT(r[0]->summary.outcome, stops ? UZ_DISMISSED : UZ_CONVERGED);
+        CHECK_MSG(stops ? r[1]->summary.outcome == of_much : r[1]->summary.outcome != UZ_CONVERGED, "%s",
+                  r[1]->summary.message);
+        of_much = r[1]->summary.outcome;
+        p.stop_at = p.asked - 1; /* the last question is one of the look */
+        uz_results_free(r, 2);
+    }
+    uz_scene_clear(&s);
+}
+
 /* The time of the whole solve is over when the iterations begin. */
 TEST(without_time_there_is_a_certified_answer)
 {
