@@ -334,11 +334,12 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
     if (status != UZ_OK)
         return NAN;
     double stored;
-    sums.eta2 += uz_spring_error(eta2, &stored, model, scene, nodal, sums.whole);
+    const double springs = uz_spring_error(eta2, &stored, model, scene, nodal, sums.whole);
+    if (isnan(springs))
+        return NAN;
+    sums.eta2 += springs;
     sums.whole += stored;
     sums.stress += stored;
-    if (isnan(sums.eta2))
-        return NAN;
     if (!(sums.whole > 0 && isfinite(sums.whole)))
         return INFINITY;
     const double stressed = sqrt(sums.stress / sums.whole);

@@ -158,9 +158,10 @@ uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model 
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     uz_nodal_strains_clear(&x.nodal);
     double stored;
-    x.eta2 += uz_spring_error(eta2, &stored, model, scene, u, 2 * x.energy);
-    if (status == UZ_OK && isnan(x.eta2))
+    const double springs = uz_spring_error(eta2, &stored, model, scene, u, 2 * x.energy);
+    if (status == UZ_OK && isnan(springs))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to look at what springs do");
+    x.eta2 += springs;
     x.energy += 0.5 * stored;
     const double square = 2 * x.energy + x.eta2;
     const bool told = status == UZ_OK && !x.failed, rests = x.energy == 0 && x.eta2 == 0;

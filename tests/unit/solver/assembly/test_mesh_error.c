@@ -580,3 +580,26 @@ TEST(random_scenes_have_the_stresses_and_estimates_of_single_elements)
         uz_scene_clear(&s.scene);
     }
 }
+
+/* NaN is for want of memory alone. */
+TEST(what_no_double_holds_is_infinite)
+{
+    for (int springs = 0; springs < 2; springs++) {
+        uz_scene s = body_scene(UZ_PLANE_STRAIN, "quad4", (double[3]){2, 1, 0}, (int64_t[3]){2, 2, 0});
+        body_hold(&s, "left", 0, 0, NAN);
+        if (springs) {
+            body_hold(&s, "right", 0, 0, NAN);
+            s.supports[1].kind = UZ_SUPPORT_SPRING;
+            s.supports[1].spring[0] = 1;
+        }
+        uz_body_model model = body_model(&s);
+        const int64_t n = 2 * model.mesh.n_nodes;
+        double *u = body_room(n, sizeof *u);
+        for (int64_t i = 0; i < n; i++)
+            u[i] = i % 3 == 0 ? 1e308 : -1e308;
+        CHECK(uz_estimate_mesh_error(NULL, NULL, &model, &s, u) == INFINITY);
+        free(u);
+        uz_body_model_clear(&model);
+        uz_scene_clear(&s);
+    }
+}
