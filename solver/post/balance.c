@@ -282,11 +282,15 @@ static void add_reaction(balance *b, int64_t node)
         add_force(b, &b->out->supports[rigid->support], node, R);
         return;
     }
-    uz_held_share(share, b->scene, b->dim, b->supports.idx + first, count, R);
-    for (int64_t i = first; i < first + count; i++) {
-        double f[DIM];
-        uz_held_part(f, &b->scene->supports[b->supports.idx[i]], b->dim, share);
-        add_force(b, &b->out->supports[b->supports.idx[i]], node, f);
+    for (int pass = 0; pass < (count > 1 ? 3 : 1); pass++) { /* again of the rest: directions may be nearly the same */
+        uz_held_share(share, b->scene, b->dim, b->supports.idx + first, count, R);
+        for (int64_t i = first; i < first + count; i++) {
+            double f[DIM];
+            uz_held_part(f, &b->scene->supports[b->supports.idx[i]], b->dim, share);
+            add_force(b, &b->out->supports[b->supports.idx[i]], node, f);
+            for (int c = 0; c < DIM; c++)
+                R[c] -= f[c];
+        }
     }
 }
 

@@ -163,6 +163,18 @@ def test_supports_that_meet_share_in_any_order(s):
         check(all(abs(a - b) < 1e-9 for x, y in zip(one, other) for a, b in zip(x, y)), found)
 
 
+def test_supports_along_nearly_one_direction_lose_nothing(s):
+    """What holds a corner across two normals 1e-5 apart is 1e5 times what they add up to, which was off by 1e-4."""
+    corner, load = {"where": {"x": 0, "y": 0}}, (2, -4)
+    summary = solved(s, {"problem": {
+        "kind": "scene", "model": "plane_strain", "kinematics": "fixed", "mesh": {"box": {"size": [2, 1], "cells": [4, 2]}},
+        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "loads": [{"on": "top", "traction": [1, -2]}],
+        "supports": [{"on": corner, "normal": [3, -4], "u": 0}, {"on": corner, "normal": [3 + 1e-5, -4], "u": 0}, {"on": {"where": {"x": 2, "y": 0}}, "uy": 0}]}})
+    forces = [one["force"] for one in summary["resultants"]["supports"]]
+    check(abs(forces[0][0]) > 1e5, forces)
+    check(all(abs(sum(one[c] for one in forces) + load[c]) < 1e-9 for c in range(2)) and summary["resultants"]["imbalance"] < 1e-14, forces, summary["resultants"])
+
+
 def test_facets_of_a_hole_stand_for_its_circle(s):
     """A sector of a plate on a pin too thick for its hole: chords of both circles are alike, and the pin is in none of them."""
     found, turn = [], math.pi / 4
