@@ -240,6 +240,7 @@ typedef struct {
 typedef struct {
     double strain_energy; /* with that of springs */
     double spring_energy;
+    double spring_error;     /* the square of what springs at nodes are off by, in the energy norm */
     double potential_energy; /* strain_energy less the work of the loads, over the whole body: that of the certificate
                               * leaves out what supported dofs add by themselves, and the loads' work on them */
     double kept_energy;  /* in neither of both: of warmth across the plane, in plane strain, which nothing changes. Of

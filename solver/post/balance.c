@@ -470,16 +470,14 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
         status = energy_of(&energy, &b, err);
     for (int64_t i = 0; i < n * dim && model->spring; i++)
         out->spring_energy += 0.5 * model->spring[i] * u[i] * u[i];
+    double stored;
+    if (status == UZ_OK)
+        out->spring_error = uz_spring_error(NULL, &stored, model, scene, u, 2 * (energy - out->spring_energy));
     out->strain_energy = energy - expanding + expanded;
     out->potential_energy = energy - work + expanded;
     out->imbalance = imbalance(&b);
 done:
-    free(force);
-    free(b.load);
-    free(b.contact);
-    free(b.inner);
-    free(b.held);
-    free(b.wanted);
+    uz_free_all(force, b.load, b.contact, b.inner, b.held, b.wanted);
     uz_csc_clear(&b.supports);
     return status;
 }

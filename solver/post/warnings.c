@@ -619,19 +619,22 @@ static void warn_of_mesh(uz_evaluation *out, double mesh_error, const char *text
 /* What is stored beside springs, in parts of the whole, that is told from rounding. */
 static const double LEAST_STORED = 1e-14;
 
-/* Soft springs store so much that a stress of which nothing is right is a small part of all. */
+/* Soft springs store so much that a stress of which nothing is right is a small part of all. What they are off by
+ * themselves is then more than that, and says nothing of it. */
 void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error)
 {
     char text[sizeof out->warnings[0].message];
-    const double stored = out->spring_energy / out->strain_energy;
-    const double square = mesh_error * mesh_error, own = fmax(0, 1 - square) * fmax(0, 1 - stored),
-                 error = stored > 0 ? sqrt(square / (own + square)) : mesh_error;
-    if (!(error >= COARSE_MESH) || !isfinite(error) || own + square < LEAST_STORED)
+    const double stored = out->spring_energy / out->strain_energy, all = mesh_error * mesh_error,
+                 rest = fmax(0, 1 - all), square = fmax(0, all - rest * 0.5 * out->spring_error / out->strain_energy),
+                 own = rest * fmax(0, 1 - stored),
+                 error = stored > 0 && own + square >= LEAST_STORED ? fmax(mesh_error, sqrt(square / (own + square)))
+                                                                    : mesh_error;
+    if (!(error >= COARSE_MESH) || !isfinite(error))
         return;
     snprintf(text, sizeof text,
              "the mesh itself is off by about %.2g %% in the energy norm%s: refine it, above all near contacts and "
              "corners",
-             100 * error, stored > 0 ? ", without what springs store" : "");
+             100 * error, error > mesh_error ? ", without what springs store" : "");
     warn_of_mesh(out, error, text);
 }
 
