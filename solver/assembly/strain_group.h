@@ -31,7 +31,7 @@ typedef struct {
     bool apart;                /* displacements against those of each element's first node: a translation strains
                                 * nothing, and what it would leave by rounding grows with it. Not along the radius */
     bool unrotated;            /* and less the rotation that fits them best, for the same reason. Not of rings */
-    bool large;                /* strains are those of Green and Lagrange, of elements of the standard formulation */
+    bool large;                /* strains are those of Green and Lagrange, of elements without incompatible modes */
     int64_t begin, end;        /* of uz_strain_groups: the elements from begin to end - 1; end 0: all */
 } uz_strain_source;
 

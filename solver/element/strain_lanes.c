@@ -4,6 +4,7 @@
 #include "element/element_private.h"
 #include "element/lane_shape.h"
 
+#include <math.h>
 #include <string.h>
 
 #define TWO_PI 6.28318530717958647693
@@ -252,6 +253,36 @@ UZ_INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, cons
 
 /* ---- for each kind of processor */
 
+/* det F becomes its mean over the volume at rest: C is multiplied by the n-th root of the square of what this is more.
+ * Of det F - 1, as strains may be tiny. */
+UZ_INLINE void take_mean_determinant(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                     const uz_lane_shape *shape, uz_lanes H[][3][3], int dim)
+{
+    uz_lanes sum = {0}, volume = {0}, own[UZ_ELEMENT_GAUSS];
+    for (int g = 0; g < rule->points; g++) {
+        uz_lanes(*h)[3] = H[g];
+        const uz_lanes minor = h[0][0] * h[1][1] - h[0][1] * h[1][0], across = h[2][2];
+        own[g] = h[0][0] + h[1][1] + minor;
+        if (rule->direct == 3)
+            own[g] += across + (h[0][0] + h[1][1] + minor) * across;
+        if (dim == 3)
+            own[g] += h[0][1] * h[1][2] * h[2][0] + h[0][2] * h[1][0] * h[2][1] - (1 + h[0][0]) * h[1][2] * h[2][1] -
+                      (1 + h[1][1]) * h[0][2] * h[2][0];
+        if (g < rule->averaged)
+            continue;
+        sum += shape->volume[g] * own[g];
+        volume += shape->volume[g];
+    }
+    sum /= volume;
+    for (int g = 0; g < rule->points; g++) {
+        uz_lanes more = {0};
+        for (int l = 0; l < UZ_STRAIN_LANES; l++)
+            more[l] = expm1(2.0 / rule->direct * (log1p(sum[l]) - log1p(own[g][l])));
+        for (int c = 0; c < rule->stresses; c++)
+            strain[g][c] += more * (strain[g][c] + (c < rule->direct ? 0.5 : 0));
+    }
+}
+
 /* (H'H)_ij of the components' axes i and j, half of it where these are one: of rings H[2][2] is that around. */
 UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                                 const uz_lane_shape *shape, const uz_lanes *u, int dim)
@@ -271,6 +302,8 @@ UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz
             strain[g][c] += (i == j ? 0.5 : 1.0) * square;
         }
     }
+    if (rule->formulation == UZ_FORMULATION_BBAR)
+        take_mean_determinant(strain, rule, shape, H, dim);
 }
 
 UZ_INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)

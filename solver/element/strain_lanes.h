@@ -50,8 +50,8 @@ typedef struct {
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
 
-/* Those of Green and Lagrange, (H + H' + H'H) / 2 with shears 2 E_xy, for large deformation: of the standard
- * formulation alone. */
+/* Those of Green and Lagrange, (H + H' + H'H) / 2 with shears 2 E_xy, for large deformation: without incompatible
+ * modes; of mean dilatation those of F whose determinant is its mean (finite/mean_dilatation.h). */
 void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                            const uz_lane_shape *shape, const uz_lanes *u);
 

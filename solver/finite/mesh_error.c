@@ -27,15 +27,17 @@ enum { N_STRAINS = UZ_FINITE_STRAINS };
 #define ROUNDING 1e-13
 /* Steps to the strain that is free of stress in the plane. */
 enum { MOST_STEPS = 20 };
+/* A way for differences, as a part of the body. */
+#define STEP 1e-6
 
 typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal;
     double energy, eta2, unit; /* unit: integral of the moduli, twice the energy of a strain of 1 */
     bool failed;               /* a point has no energy */
-    /* What is compared: own E(u), and, `to` not NULL, half of what E(to[0]) - E(to[1]) is. Then the nodes have means of
-     * that. moved: room for both */
-    double own, *eta2_of; /* eta2_of: n_elements; NULL: not wanted */
+    /* What is compared: own E(u), and, `to` not NULL, half of what E(to[0]) - E(to[1]) is, by the step. Then the nodes
+     * have means of that. moved: room for both */
+    double own, step, *eta2_of; /* step: of z in to[0]; eta2_of: n_elements; NULL: not wanted */
     const uz_strain_source *to;
     uz_strain_group *moved;
     bool whole; /* with what is hidden */
@@ -87,7 +89,7 @@ static bool compare_at(double *W, double *eta2, const comparison *x, const uz_st
         const double E = group->strain[p][c][lane] - (at[c] < 3 ? thermal(warm) : 0);
         off[c] = -x->own * (E + (at[c] < 3 ? thermal(mean) : 0));
         if (x->to)
-            off[c] -= 0.5 * (x->moved[0].strain[p][c][lane] - x->moved[1].strain[p][c][lane]);
+            off[c] -= (x->moved[0].strain[p][c][lane] - x->moved[1].strain[p][c][lane]) / (2 * x->step);
         for (int a = 0; a < group->rule.nodes; a++)
             off[c] += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + c];
         off[c] *= per_square;
@@ -170,7 +172,7 @@ uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model 
 }
 
 /* x->nodal becomes the means of what is compared: E is a polynomial of degree two, whose derivative along z is half of
- * what it differs by between u + z and u - z. */
+ * what it differs by between u + z and u - z. With mean dilatation it is none, and the way is a small part of z. */
 static uz_status recover_along(comparison *x, const uz_strain_source *from, uz_error *err)
 {
     uz_nodal_strains *to = &x->nodal;
@@ -182,10 +184,23 @@ static uz_status recover_along(comparison *x, const uz_strain_source *from, uz_e
         status = uz_nodal_strains_recover(&moved, &x->to[k], UZ_CONTINUE_LINEAR, NULL, err);
         for (int64_t i = 0; i < to->count * to->size && status == UZ_OK; i++)
             if (i % to->size < to->strains)
-                to->rows[i] += (k == 0 ? 0.5 : -0.5) * moved.rows[i];
+                to->rows[i] += (k == 0 ? 0.5 : -0.5) / x->step * moved.rows[i];
         uz_nodal_strains_clear(&moved);
     }
     return status;
+}
+
+/* What part of times z is gone for a derivative. */
+static double step_along(const uz_body_model *model, const double *z, double times)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    bool averaged = false;
+    double most = 0;
+    for (int64_t e = 0; e < model->mesh.n_elements && !averaged; e++)
+        averaged = uz_element_formulation(model, e) == UZ_FORMULATION_BBAR;
+    for (int64_t i = 0; i < n && averaged; i++)
+        most = fmax(most, fabs(times * z[i]));
+    return most > 0 ? STEP * model->mesh.extent / most : 1;
 }
 
 uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_model *model, const double *free_strain,
@@ -202,9 +217,10 @@ uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_mod
     if (!place || !x.moved)
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld nodes", (long long)model->mesh.n_nodes);
+    x.step = x.to ? step_along(model, z, times) : 1;
     for (int64_t i = 0; i < n && status == UZ_OK && x.to; i++) {
-        place[i] = u[i] + times * z[i];
-        place[n + i] = u[i] - times * z[i];
+        place[i] = u[i] + x.step * times * z[i];
+        place[n + i] = u[i] - x.step * times * z[i];
     }
     to[0].nodal = place;
     to[1].nodal = place ? place + n : NULL;

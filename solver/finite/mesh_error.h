@@ -5,7 +5,7 @@
 #include "assembly/assembly.h"
 
 /* *error: about ||u - u_h|| / ||u|| in the energy norm of the tangent at u_h, for the displacements u (n_nodes x dim)
- * of an equilibrium of the scene in the standard formulation; free_strain: n_elements, of the temperature, NULL: none.
+ * of an equilibrium of the scene; free_strain: n_elements, of the temperature, NULL: none.
  * What uz_estimate_mesh_error is of small deformation, which it becomes. eta2: n_elements, what each has of the square
  * of the error, an energy; NULL: not wanted. 0 of a body that nothing strains; NaN where the law has no energy
  * somewhere, or strains are rounding. UZ_ERR_MEMORY: *error is NaN, too. */
