@@ -4,6 +4,7 @@
 #include "assembly/parts.h"
 #include "assembly/row_turn.h"
 #include "certificate/envelope.h"
+#include "certificate/mean_piola.h"
 #include "certificate/pair_gaps.h"
 #include "certificate/piola.h"
 #include "certificate/point_force.h"
@@ -294,6 +295,79 @@ static double least_on_edges(const uz_element *element, const double *u, const u
     return least;
 }
 
+/* Of an element of mean dilatation, none of whose points is inverted: the mean of det F, that of dW / dtheta, and its
+ * derivative; and by nodes the derivatives of theta by the volume, and of pressure by the volume at the same theta. */
+typedef struct {
+    long double volume, theta, pressure, slope, along[UZ_ELEMENT_DOFS], cross[UZ_ELEMENT_DOFS];
+} mean_of;
+
+/* out (dim nodes) += what P does there. */
+static void pull_along(long double *out, long double weight, const point_at *x, const long double P[9])
+{
+    for (int p = 0; p < x->dim * x->nodes; p++) {
+        const int a = p / x->dim, i = p % x->dim;
+        for (int J = 0; J < x->dim; J++)
+            out[p] += weight * P[3 * i + J] * x->grad[a][J];
+        if (x->ring && i == 0)
+            out[p] += weight * P[8] * x->around[a];
+    }
+}
+
+/* False: a point is inverted. */
+static bool find_mean(mean_of *mean, const uz_element *element, const double *u, const uz_lame *lame, uz_elasticity law)
+{
+    const uz_gauss_rule *rule = uz_element_rule(element->kind, element->model);
+    *mean = (mean_of){.volume = 0};
+    for (int pass = 0; pass < 2; pass++) {
+        for (int g = 0; g < rule->count; g++) {
+            point_at x;
+            uz_mean_piola at;
+            long double cross[9];
+            double measure;
+            const long double det = deform(&x, &measure, element, u, rule->point[g].at);
+            const long double weight = (long double)rule->point[g].weight * measure;
+            if (!(det > 0))
+                return false;
+            if (pass == 0) {
+                mean->volume += weight;
+                mean->theta += weight * det;
+                continue;
+            }
+            uz_mean_piola_at(&at, law, lame->lambda, lame->mu, x.F, det, mean->theta, x.dim == 3, x.ring);
+            mean->pressure += weight * at.pressure / mean->volume;
+            mean->slope += weight * at.slope;
+            for (int i = 0; i < 9; i++)
+                cross[i] = at.cross[i];
+            pull_along(mean->along, weight / mean->volume, &x, at.along);
+            pull_along(mean->cross, weight, &x, cross);
+        }
+        mean->theta /= pass == 0 ? mean->volume : 1;
+    }
+    return true;
+}
+
+/* Energy, forces and tangent of a point whose dilatation is the mean. */
+static void add_mean_point(work *w, long double *force, double *rows, long double weight, const point_at *x,
+                           const mean_of *mean, long double det, const uz_lame *lame, uz_elasticity law,
+                           const double *u)
+{
+    uz_mean_piola own;
+    point_at with = *x;
+    uz_mean_piola_at(&own, law, lame->lambda, lame->mu, x->F, det, mean->theta, x->dim == 3, x->ring);
+    uz_mean_piola_press(&own, mean->pressure, det, x->dim == 3, x->ring);
+    memcpy(with.F, own.F, sizeof with.F);
+    w->energy += weight * own.at.W;
+    add_unit(w, weight, lame, &with, u);
+    (UZ_CPU_HAS("avx2") ? add_point_wide : add_point_plain)(force, rows, weight, x, &own.at);
+}
+
+/* What theta, which all nodes change, adds to the second derivative. */
+static double of_mean(const mean_of *mean, int i, int k)
+{
+    return (double)(mean->along[i] * mean->cross[k] + mean->cross[i] * mean->along[k] +
+                    mean->slope * mean->along[i] * mean->along[k]);
+}
+
 static void add_element(uz_finite_certificate *out, work *w, int64_t e)
 {
     const uz_body_model *model = w->of->model;
@@ -311,7 +385,8 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     const uz_lame lame = uz_lame_in_space(element.model, element.lame);
     const uz_elasticity law = uz_element_material(model, e)->law;
     const int n = dim * nodes;
-    const bool wide = UZ_CPU_HAS("avx2");
+    const bool wide = UZ_CPU_HAS("avx2"), averaged = element.formulation == UZ_FORMULATION_BBAR;
+    mean_of mean;
     bool unstrained = model->n_rigid > 0; /* of a rigid group */
     for (int a = 0; a < nodes && unstrained; a++)
         unstrained =
@@ -322,15 +397,20 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     if (w->of->free_strain)
         expand(&element, xyz, u, n, dim, w->of->free_strain[e]);
     out->least_det = fmin(out->least_det, least_on_edges(&element, u, &lame, law));
+    const bool upright = !averaged || find_mean(&mean, &element, u, &lame, law);
     const long double small = w->small, unit = w->unit; /* of the elements before */
     w->small = w->unit = 0;
     for (int g = 0; g < rule->count; g++) {
         long double det = deform(&x, &measure, &element, u, rule->point[g].at);
         const long double weight = (long double)rule->point[g].weight * measure;
-        const bool known = det > 0 && law_at(&at, &det, &x, &element, &lame, law);
+        const bool known = det > 0 && upright && (averaged || law_at(&at, &det, &x, &element, &lame, law));
         out->least_det = isnan(det) ? -INFINITY : fmin(out->least_det, (double)det);
         if (!known || unstrained)
             continue;
+        if (averaged) {
+            add_mean_point(w, force, rows, weight, &x, &mean, det, &lame, law, u);
+            continue;
+        }
         w->energy += weight * at.W;
         add_unit(w, weight, &lame, &x, u);
         (wide ? add_point_wide : add_point_plain)(force, rows, weight, &x, &at);
@@ -341,7 +421,8 @@ static void add_element(uz_finite_certificate *out, work *w, int64_t e)
     for (int i = 0; i < n && !unstrained; i++) {
         w->force[dim * node[i / dim] + i % dim] += force[i];
         for (int k = 0; k <= i; k++)
-            ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * UZ_ELEMENT_NODES + k / dim];
+            ke[k * n + i] = ke[i * n + k] = rows[(i * dim + k % dim) * UZ_ELEMENT_NODES + k / dim] +
+                                            (averaged && upright ? of_mean(&mean, i, k) : 0);
     }
     if (!unstrained)
         uz_add_stiffness(&w->tangent, ke, node, nodes);
