@@ -11,8 +11,7 @@
 uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     model->kind = scene->model;
-    /* that of finite kinematics, also where auto finds them not to be needed: answers are compared */
-    model->formulation = uz_has_finite_law(scene) ? UZ_FORMULATION_STANDARD : scene->formulation;
+    model->formulation = scene->formulation;
     model->thickness = scene->thickness;
     model->n_materials = scene->n_materials;
     model->materials = uz_alloc(scene->n_materials, sizeof *model->materials);

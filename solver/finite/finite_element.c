@@ -11,6 +11,8 @@
  * does not have in the end, and whose stress is all that the next tangent would see. So K's second part has S of the
  * strain that the step was made for, E - h'h / 2 with h = grad d: what stress would be as an unknown of its own. At the
  * end, where steps are small, it is the same.
+ * With mean dilatation (mean_dilatation.h) the stress at a point and its derivative have what the mean's pressure does
+ * there, and the tangent has two more terms, of rank two together.
  * Sources: Bonet and Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", ch. 9; total Lagrangian form of
  * Bathe, "Finite Element Procedures", ch. 6; of the step: Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech.
  * Engrg. 313 (2017) 986-1005. */
@@ -18,6 +20,7 @@
 
 #include "core/cpu.h"
 #include "finite/hyperelastic_lanes.h"
+#include "finite/mean_dilatation.h"
 #include "finite/point_lanes.h"
 
 #include <math.h>
@@ -125,21 +128,39 @@ typedef struct {
     double W[POINTS], S[N_STRAINS][POINTS], D[N_STRAINS][N_STRAINS][POINTS];
 } law_points;
 
-/* At all Gauss points, but of plane stress, whose F is not known across the plane. False: det C <= 0 at one. */
-UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, uz_gradients H, double across, bool tangent,
-                         uz_elasticity law, uz_lame lame, int dim, bool ring)
+/* What mean dilatation adds: of the element the mean theta of det F, the directions that it is shared by, the volume
+ * and, as `slope`, by how much the mean's pressure grows with theta; of Gauss points what C is multiplied by, and the
+ * derivatives of det F (`along`) and of that pressure (`cross`) by strains. */
+typedef struct {
+    int n;
+    double theta, volume, slope, det[POINTS], ratio[POINTS], along[N_STRAINS][POINTS], cross[N_STRAINS][POINTS];
+} mean_points;
+
+/* F'F of four points. */
+UZ_INLINE void cauchy_greens(four C[N_STRAINS], four F[3][3], int dim)
+{
+    for (int c = 0; c < N_STRAINS; c++) {
+        const int i = AXIS[c][0], j = AXIS[c][1];
+        C[c] = (four){0};
+        for (int k = 0; k < 3 && (dim == 3 || c < UZ_FINITE_PLANE_STRAINS); k++)
+            C[c] += F[k][i] * F[k][j];
+    }
+}
+
+/* At all Gauss points, but of plane stress, whose F is not known across the plane. mean: the law is that of C with the
+ * mean dilatation; NULL: its own. False: det C <= 0 at one. */
+UZ_INLINE bool find_laws(law_points *out, const mean_points *mean, const uz_finite_rule *rule, uz_gradients H,
+                         double across, bool tangent, uz_elasticity law, uz_lame lame, int dim, bool ring)
 {
     const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
     for (int p = 0; p < rule->gauss; p += LANES) {
         bool good;
         four F[3][3], C[N_STRAINS], W, S[N_STRAINS], D[N_STRAINS][N_STRAINS];
         deformations(F, H, p, across, dim, ring);
-        for (int c = 0; c < N_STRAINS; c++) {
-            const int i = AXIS[c][0], j = AXIS[c][1];
-            C[c] = (four){0};
-            for (int k = 0; k < 3 && (dim == 3 || c < UZ_FINITE_PLANE_STRAINS); k++)
-                C[c] += F[k][i] * F[k][j];
-        }
+        cauchy_greens(C, F, dim);
+        for (int c = 0; c < n && mean; c++)
+            if (c != 2 || dim == 3 || ring)
+                C[c] *= *uz_four_from(&mean->ratio[p]);
         const int count = rule->gauss - p < LANES ? rule->gauss - p : LANES;
         uz_law_in_lanes(&good, &W, S, tangent ? D : NULL, n, count, law, lame.lambda, lame.mu, C);
         if (!good)
@@ -152,6 +173,89 @@ UZ_INLINE bool find_laws(law_points *out, const uz_finite_rule *rule, uz_gradien
         }
     }
     return true;
+}
+
+/* det F at four points. */
+UZ_INLINE void determinants(four *det, four F[3][3], int dim)
+{
+    *det = F[0][0] * F[1][1] - F[0][1] * F[1][0];
+    *det *= F[2][2];
+    if (dim == 3)
+        *det += F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]) - F[0][0] * F[1][2] * F[2][1] +
+                F[0][1] * F[1][2] * F[2][0];
+}
+
+/* The mean of det F, which is positive at all points, and what C is multiplied by to have it. */
+UZ_INLINE void find_mean(mean_points *out, const uz_finite_rule *rule, uz_gradients H, const uz_rest *at, double across,
+                         int dim, bool ring)
+{
+    double sum = 0;
+    out->n = dim == 3 || ring ? 3 : 2;
+    out->volume = 0;
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        four F[3][3];
+        deformations(F, H, p, across, dim, ring);
+        determinants(uz_four_at(&out->det[p]), F, dim);
+    }
+    for (int g = 0; g < rule->gauss; g++) {
+        sum += at->volume[g] * out->det[g];
+        out->volume += at->volume[g];
+    }
+    out->theta = sum / out->volume;
+    for (int p = 0; p < rule->gauss; p += LANES)
+        for (int l = p; l < p + LANES; l++) {
+            const double part = out->theta / out->det[l], root = out->n == 3 ? cbrt(part) : 1;
+            out->ratio[l] = out->n == 3 ? root * root : part;
+        }
+}
+
+/* The law's stress and tangent at C with the mean dilatation become those at C and, with the pressure of the mean,
+ * those of the element's energy by C. */
+UZ_INLINE void spread_mean(law_points *laws, mean_points *mean, const uz_finite_rule *rule, uz_gradients H,
+                           const uz_rest *at, double across, bool tangent, int dim, bool ring)
+{
+    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    double pressure = 0, slope = 0;
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        four F[3][3], C[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS];
+        uz_mean_law x = {.theta = mean->theta, .n = mean->n};
+        deformations(F, H, p, across, dim, ring);
+        cauchy_greens(C, F, dim);
+        for (int i = 0; i < n; i++) {
+            S[i] = *uz_four_from(&laws->S[i][p]);
+            for (int j = 0; j < n && tangent; j++)
+                D[i][j] = *uz_four_from(&laws->D[i][j][p]);
+        }
+        uz_mean_law_of(&x, S, tangent ? D : NULL, C, uz_four_from(&mean->ratio[p]), n);
+        for (int i = 0; i < n; i++) {
+            *uz_four_at(&laws->S[i][p]) = S[i];
+            *uz_four_at(&mean->along[i][p]) = *uz_four_from(&mean->det[p]) * x.B[i];
+            for (int j = 0; j < n && tangent; j++)
+                *uz_four_at(&laws->D[i][j][p]) = D[i][j];
+            if (tangent)
+                *uz_four_at(&mean->cross[i][p]) = x.cross[i];
+        }
+        for (int g = p; g < p + LANES && g < rule->gauss; g++) {
+            pressure += at->volume[g] * x.pressure[g - p];
+            slope += tangent ? at->volume[g] * x.slope[g - p] : 0;
+        }
+    }
+    mean->slope = slope / mean->volume;
+    pressure /= mean->volume;
+    for (int p = 0; p < rule->gauss; p += LANES) {
+        four B[N_STRAINS], change[N_STRAINS][N_STRAINS];
+        const four det = *uz_four_from(&mean->det[p]);
+        for (int i = 0; i < n; i++) {
+            const four along = *uz_four_from(&mean->along[i][p]);
+            B[i] = along / det;
+            *uz_four_at(&laws->S[i][p]) += pressure * along;
+        }
+        if (tangent)
+            uz_mean_change(change, B, n);
+        for (int i = 0; i < n && tangent; i++)
+            for (int j = 0; j < n; j++)
+                *uz_four_at(&laws->D[i][j][p]) += pressure * det * change[i][j];
+    }
 }
 
 /* The same of plane stress, point by point; false also where no stretch across the plane is without stress. */
@@ -179,11 +283,8 @@ UZ_INLINE void look_at_orientation(double *least, const uz_finite_rule *rule, uz
     for (int p = 0; p < rule->points; p += LANES) {
         four F[3][3];
         deformations(F, H, p, across, dim, ring);
-        four det = F[0][0] * F[1][1] - F[0][1] * F[1][0];
-        det *= F[2][2];
-        if (dim == 3)
-            det += F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]) - F[0][0] * F[1][2] * F[2][1] +
-                   F[0][1] * F[1][2] * F[2][0];
+        four det;
+        determinants(&det, F, dim);
         for (int l = 0; l < LANES && p + l < rule->points; l++) {
             const double own = dim == 3 || F[2][2][l] > 0 ? det[l] : -fabs(det[l]);
             *least = own < *least ? own : *least;
@@ -225,8 +326,9 @@ UZ_INLINE void slopes_of_nodes(points *out, const uz_finite_rule *rule, const uz
 
 /* force[axis][node]: what the stress does, P = F S: of each point Q = P by local coordinates, times the slopes by
  * these. */
-UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_points *laws, const uz_finite_rule *rule,
-                           uz_gradients H, const uz_rest *at, double across, int dim, int wide, bool ring)
+UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const double (*S)[POINTS],
+                           const uz_finite_rule *rule, uz_gradients H, const uz_rest *at, double across, int dim,
+                           int wide, bool ring)
 {
     for (int i = 0; i < dim; i++)
         for (int w = 0; w < wide; w++)
@@ -237,13 +339,12 @@ UZ_INLINE void find_forces(four force[3][UZ_ELEMENT_NODES / LANES], const law_po
         deformations(F, H, p, across, dim, ring);
         for (int i = 0; i < dim; i++) {
             for (int J = 0; J < dim; J++) {
-                P[i][J] = F[i][0] * *uz_four_from(&laws->S[COMPONENT[J][0]][p]);
+                P[i][J] = F[i][0] * *uz_four_from(&S[COMPONENT[J][0]][p]);
                 for (int M = 1; M < dim; M++)
-                    P[i][J] += F[i][M] * *uz_four_from(&laws->S[COMPONENT[J][M]][p]);
+                    P[i][J] += F[i][M] * *uz_four_from(&S[COMPONENT[J][M]][p]);
             }
             if (ring && i == 0) { /* on the axis u_r / r is the derivative along r */
-                const four hoop = F[2][2] * *uz_four_from(&laws->S[2][p]),
-                           per_radius = *uz_four_from(&at->per_radius[p]);
+                const four hoop = F[2][2] * *uz_four_from(&S[2][p]), per_radius = *uz_four_from(&at->per_radius[p]);
                 around = volume * hoop * per_radius;
                 four along = hoop;
                 for (int l = 0; l < LANES; l++)
@@ -286,21 +387,48 @@ UZ_INLINE void moduli(double A[COMPONENTS][PADDED], double F[3][3], double D[N_S
         A[AROUND][v] = F[2][2] * DF[2][v] + (v == AROUND ? volume * T[2] : 0);
 }
 
-/* S of the strain without h'h / 2. */
-UZ_INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], uz_gradients of_step,
-                             int p, int dim, bool ring)
+/* h'h / 2 at a point. */
+UZ_INLINE void strain_left(double q[N_STRAINS], uz_gradients of_step, int p, int dim, bool ring)
 {
-    double h[3][3], q[N_STRAINS];
-    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    double h[3][3];
     deformation(h, of_step, p, dim, ring);
     for (int i = 0; i < 3; i++)
         h[i][i] -= 1;
     cauchy_green(q, h, dim);
+    for (int i = 0; i < 3; i++)
+        q[i] *= 0.5;
+}
+
+/* S of the strain without h'h / 2. */
+UZ_INLINE void stress_before(double T[N_STRAINS], const double *S, double D[N_STRAINS][N_STRAINS], uz_gradients of_step,
+                             int p, int dim, bool ring)
+{
+    double q[N_STRAINS];
+    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    strain_left(q, of_step, p, dim, ring);
     for (int i = 0; i < n; i++) {
         T[i] = S[i];
         for (int j = 0; j < n; j++)
-            T[i] -= (j < 3 ? 0.5 : 1) * D[i][j] * q[j];
+            T[i] -= D[i][j] * q[j];
     }
+}
+
+/* How the strains h'h / 2 of all points change the mean of det F, and its pressure. */
+UZ_INLINE void mean_left(double *theta, double *pressure, const mean_points *mean, const uz_finite_rule *rule,
+                         const uz_rest *at, uz_gradients of_step, int dim, bool ring)
+{
+    const int n = dim == 2 ? UZ_FINITE_PLANE_STRAINS : N_STRAINS;
+    double sum[2] = {0};
+    for (int g = 0; g < rule->gauss; g++) {
+        double q[N_STRAINS];
+        strain_left(q, of_step, g, dim, ring);
+        for (int i = 0; i < n; i++) {
+            sum[0] += at->volume[g] * mean->along[i][g] * q[i];
+            sum[1] += at->volume[g] * mean->cross[i][g] * q[i];
+        }
+    }
+    *theta = sum[0] / mean->volume;
+    *pressure = sum[1] / mean->volume + mean->slope * *theta;
 }
 
 /* ---- the tangent */
@@ -380,6 +508,26 @@ UZ_INLINE void tangent_of(double *ke, const points *at, const uz_finite_rule *ru
     }
 }
 
+/* With g the derivative of the mean of det F by nodes, a that of its pressure at the same mean: g (a + slope g)' and
+ * its transpose, by the volume. */
+UZ_INLINE void add_mean(double *ke, const mean_points *mean, const uz_finite_rule *rule, uz_gradients H,
+                        const uz_rest *at, double across, int dim, int wide, bool ring)
+{
+    four by[2][3][UZ_ELEMENT_NODES / LANES];
+    double g[UZ_ELEMENT_DOFS], a[UZ_ELEMENT_DOFS];
+    const int n = dim * rule->nodes;
+    find_forces(by[0], mean->along, rule, H, at, across, dim, wide, ring);
+    find_forces(by[1], mean->cross, rule, H, at, across, dim, wide, ring);
+    for (int i = 0; i < n; i++) {
+        const int node = i / dim, c = i % dim;
+        g[i] = by[0][c][node / LANES][node % LANES] / mean->volume;
+        a[i] = by[1][c][node / LANES][node % LANES] + 0.5 * mean->slope * mean->volume * g[i];
+    }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            ke[i * n + j] += g[i] * a[j] + a[i] * g[j];
+}
+
 /* ---- an element */
 
 typedef struct {
@@ -399,23 +547,33 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
     uz_rest rest;
     uz_gradients H, of_step;
     law_points laws;
+    mean_points mean;
     points at;
+    double theta = 0, pressure = 0;
     four force[3][UZ_ELEMENT_NODES / LANES];
     const uz_model model = x->element->model;
     const uz_lame lame = uz_lame_in_space(model, x->element->lame);
+    /* of elements of these sizes alone */
+    const bool averaged = wide == dim - 1 && x->element->formulation == UZ_FORMULATION_BBAR;
     uz_rest_of(&rest, rule, x->element, dim, ring);
     uz_find_gradients(H, rule, &rest, x->u, dim, ring);
     if (x->ke && x->step)
         uz_find_gradients(of_step, rule, &rest, x->step, dim, ring);
     const double across = dim == 2 && !ring ? x->element->across : 0;
     look_at_orientation(&out->least_det, rule, H, across, dim, ring);
-    if (!(out->least_det > 0) ||
-        !(model == UZ_PLANE_STRESS ? settle_laws(&laws, rule, H, x->law, lame)
-                                   : find_laws(&laws, rule, H, across, x->ke, x->law, lame, dim, ring))) {
+    if (out->least_det > 0 && averaged)
+        find_mean(&mean, rule, H, &rest, across, dim, ring);
+    if (!(out->least_det > 0) || !(model == UZ_PLANE_STRESS ? settle_laws(&laws, rule, H, x->law, lame)
+                                                            : find_laws(&laws, averaged ? &mean : NULL, rule, H, across,
+                                                                        x->ke, x->law, lame, dim, ring))) {
         out->least_det = fmin(out->least_det, 0);
         return false;
     }
-    find_forces(force, &laws, rule, H, &rest, across, dim, wide, ring);
+    if (averaged)
+        spread_mean(&laws, &mean, rule, H, &rest, across, x->ke, dim, ring);
+    if (averaged && x->ke && x->step)
+        mean_left(&theta, &pressure, &mean, rule, &rest, of_step, dim, ring);
+    find_forces(force, laws.S, rule, H, &rest, across, dim, wide, ring);
     for (int g = 0; g < rule->gauss; g++)
         out->energy += rest.volume[g] * laws.W[g];
     for (int g = 0; g < rule->gauss && x->ke; g++) {
@@ -431,6 +589,8 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
         slopes_of_nodes(&at, rule, &rest, g, dim, wide, ring);
         if (x->step)
             stress_before(T, S, D, of_step, g, dim, ring);
+        for (int i = 0; i < n && averaged && x->step; i++)
+            T[i] -= mean.cross[i][g] * theta + mean.along[i][g] * pressure;
         moduli(at.A[g], F, D, x->step ? T : S, rest.volume[g], dim, ring);
     }
     for (int a = 0; a < rule->nodes; a++)
@@ -438,6 +598,8 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
             out->force[dim * a + i] = force[i][a / LANES][a % LANES];
     if (x->ke)
         tangent_of(x->ke, &at, rule, dim, wide, ring);
+    if (x->ke && averaged)
+        add_mean(x->ke, &mean, rule, H, &rest, across, dim, wide, ring);
     return true;
 }
 
@@ -532,6 +694,24 @@ bool uz_finite_law(double *W, double S[N_STRAINS], double D[N_STRAINS][N_STRAINS
     return law_at(W, S, D, F, C, element->model, uz_lame_in_space(element->model, element->lame), law);
 }
 
+/* F of a point whose det F is det becomes that with the mean dilatation of the element. Returns what det F is then. */
+static double take_mean(double F[3][3], double det, const uz_element *element, const double *u)
+{
+    const bool ring = element->model == UZ_AXISYMMETRIC;
+    uz_finite_rule rule;
+    uz_rest rest;
+    uz_gradients H;
+    mean_points mean;
+    uz_finite_rule_of(&rule, element->kind, element->model);
+    uz_rest_of(&rest, &rule, element, rule.dim, ring);
+    uz_find_gradients(H, &rule, &rest, u, rule.dim, ring);
+    find_mean(&mean, &rule, H, &rest, rule.dim == 2 && !ring ? element->across : 0, rule.dim, ring);
+    const double part = mean.theta / det, size = mean.n == 3 ? cbrt(part) : sqrt(part);
+    for (int i = 0; i < 9; i++)
+        F[i / 3][i % 3] *= i < 8 || mean.n == 3 ? size : 1;
+    return mean.theta;
+}
+
 void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elasticity law, const double *u,
                         const double point[3])
 {
@@ -545,11 +725,14 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
     uz_find_gradients(H, &rule, &rest, u, rule.dim, ring);
     deformation(F, H, 0, rule.dim, ring);
     F[2][2] += element->across;
-    out->det = orientation(F, rule.dim);
+    double det = out->det = orientation(F, rule.dim);
+    if (det > 0 && element->formulation == UZ_FORMULATION_BBAR)
+        det = take_mean(F, det, element, u);
     cauchy_green(C, F, rule.dim);
     const bool good =
-        out->det > 0 && law_at(&W, S, D, F, C, element->model, uz_lame_in_space(element->model, element->lame), law);
-    out->det = orientation(F, rule.dim);
+        det > 0 && law_at(&W, S, D, F, C, element->model, uz_lame_in_space(element->model, element->lame), law);
+    if (element->model == UZ_PLANE_STRESS)
+        det = out->det = orientation(F, rule.dim);
     for (int c = 0; c < N_STRAINS; c++)
         out->strain[c] = 0.5 * (C[c] - (c < 3));
     const double full[3][3] = {{S[0], S[3], S[5]}, {S[3], S[1], S[4]}, {S[5], S[4], S[2]}};
@@ -558,6 +741,6 @@ void uz_finite_state_at(uz_finite_state *out, const uz_element *element, uz_elas
         for (int k = 0; k < 3; k++)
             for (int l = 0; l < 3; l++)
                 sum += F[AXIS[c][0]][k] * full[k][l] * F[AXIS[c][1]][l];
-        out->stress[c] = good ? sum / out->det : NAN;
+        out->stress[c] = good ? sum / det : NAN;
     }
 }

@@ -12,9 +12,9 @@ typedef struct {
 } uz_finite_forces;
 
 /* Of an element in the plane, of a ring or a solid, whose shape is good, displaced by u (nodes x dim).
- * rule: uz_finite_rule_of its kind and model. ke (NULL: not
- * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it; at u = 0
- * it is that of the standard formulation. False: det F <= 0 somewhere, or
+ * Without incompatible modes. rule: uz_finite_rule_of its kind and model. ke (NULL: not
+ * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it, which it
+ * is at u = 0. False: det F <= 0 somewhere, or
  * in plane stress no stretch across the plane is without stress; least_det alone is then filled. step  nodes x
  * dim, the last change of u: in ke alone, what the stress does to turning parts is that of the strains that this change
  * was linear for. NULL: none */
@@ -31,8 +31,7 @@ void uz_finite_warm(uz_element *element, double *xyz, double *u, double free_str
 bool uz_finite_law(double *W, double S[6], double D[6][6], double C[6], const uz_element *element, uz_elasticity law);
 
 /* At a local point: det F, and Cauchy's stress and the Green-Lagrange strain with the components xx, yy, zz, xy, yz,
- * zx.
- */
+ * zx, of mean dilatation those of F with the mean of det F. */
 typedef struct {
     double det, stress[6], strain[6];
 } uz_finite_state;

@@ -33,7 +33,7 @@ static const int PLANE[N] = {0, 1, 3}, SPACE[N] = {0, 1, 2, 3, 4, 5};
 typedef struct {
     const uz_body_model *model;
     const int *part;   /* of AXIS, by component of strain */
-    bool nonstandard;  /* some element is not of the standard formulation */
+    bool other;        /* some element has incompatible modes, which large deformation has not */
     const uz_lame *of; /* whose strip_modulus `modulus_of` is */
     double modulus_of;
     uz_lanes squares, along, law, turns, gradient; /* integrals, over every fourth element in each lane */
@@ -91,7 +91,23 @@ UZ_INLINE void strain_across(uz_lanes *across, const uz_strain_group *group, con
             uz_strain_zz(UZ_PLANE_STRESS, *group->lame[l], (double[]){stress[0][l], stress[1][l], stress[2][l]}, 0);
 }
 
-UZ_INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *volume, uz_lanes H[3][3])
+/* e and Q, what H'H adds to it, whose traces may become means. */
+typedef struct {
+    uz_lanes e, Q;
+} traces;
+
+UZ_INLINE void traces_of(traces *out, const uz_strain_group *group, uz_lanes H[3][3])
+{
+    *out = (traces){{0}, {0}};
+    for (int i = 0; i < group->rule.direct; i++) {
+        out->e += H[i][i];
+        out->Q += H[0][i] * H[0][i] + H[1][i] * H[1][i] + H[2][i] * H[2][i];
+    }
+}
+
+/* mean: of mean dilatation, else NULL. */
+UZ_INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes *volume, uz_lanes H[3][3],
+                         const traces *mean)
 {
     const uz_lanes weight = *volume;
     uz_lanes across, Q[N], e[N], of_Q[N], of_e[N], size = {0};
@@ -101,6 +117,14 @@ UZ_INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes 
         const int i = AXIS[to->part[k]][0], j = AXIS[to->part[k]][1];
         Q[k] = (i == j ? 1 : 2) * (H[0][i] * H[0][j] + H[1][i] * H[1][j] + H[2][i] * H[2][j]);
         e[k] = (i == j ? 0.5 : 1) * (H[i][j] + H[j][i]);
+    }
+    if (mean) {
+        traces own;
+        traces_of(&own, group, H);
+        for (int k = 0; k < group->rule.direct; k++) {
+            e[k] += (mean->e - own.e) / group->rule.direct;
+            Q[k] += (mean->Q - own.Q) / group->rule.direct;
+        }
     }
     stress_of(of_Q, group, Q);
     stress_of(of_e, group, e);
@@ -127,12 +151,25 @@ UZ_INLINE void add_point(sums *to, const uz_strain_group *group, const uz_lanes 
 UZ_INLINE void add_group(sums *to, const uz_strain_group *group, const uz_lanes *modulus)
 {
     uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+    const bool averaged = group->rule.formulation == UZ_FORMULATION_BBAR;
+    traces mean = {{0}, {0}}, own;
+    uz_lanes all = {0};
     uz_lane_gradients(H, &group->rule, &group->shape, group->u);
+    for (int g = 0; g < group->rule.asked && averaged; g++) {
+        traces_of(&own, group, H[g]);
+        mean.e += group->shape.volume[g] * own.e;
+        mean.Q += group->shape.volume[g] * own.Q;
+        all += group->shape.volume[g];
+    }
+    if (averaged) {
+        mean.e /= all;
+        mean.Q /= all;
+    }
     for (int g = 0; g < group->rule.asked; g++) {
         uz_lanes weight = group->shape.volume[g];
         for (int l = group->count; l < UZ_STRAIN_LANES; l++)
             weight[l] = 0;
-        add_point(to, group, &weight, H[g]);
+        add_point(to, group, &weight, H[g], averaged ? &mean : NULL);
         to->modulus += weight * *modulus;
     }
 }
@@ -159,8 +196,8 @@ static void take(void *ctx, const uz_strain_group *group)
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
 {
     sums *to = ctx;
-    to->nonstandard = to->nonstandard || formulation != UZ_FORMULATION_STANDARD;
-    uz_strain_rule_at(rule, kind, to->model->kind, UZ_FORMULATION_STANDARD, NULL, NULL, 0);
+    to->other = to->other || formulation == UZ_FORMULATION_INCOMPATIBLE;
+    uz_strain_rule_at(rule, kind, to->model->kind, formulation, NULL, NULL, 0);
 }
 
 static double total(const uz_lanes *of)
@@ -276,7 +313,7 @@ uz_status uz_measure_nonlinear(double *out, const uz_body_model *model, const do
     const uz_strain_work work = {make_rule, take, &all};
     const uz_status status = uz_strain_groups(&work, &from, NULL, err);
     *out = NAN;
-    if (status != UZ_OK || all.nonstandard)
+    if (status != UZ_OK || all.other)
         return status;
     const double part = mean_strain(&all) / buckling, gradient = total(&all.gradient);
     const double aside = gradient > 0 ? sqrt(total(&all.turns) / gradient) : 0;

@@ -50,7 +50,6 @@ typedef struct {
     const double *u, *r;
     double sliding, mesh_error;
     uz_evaluation *out;
-    bool large; /* deformation, which has no other formulations */
 } doubts;
 
 __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const char *code, double value,
@@ -666,9 +665,7 @@ static void look_at_mesh(const doubts *d)
         warn(d->out, "locking", poisson,
              "element %lld (%s) has Poisson's ratio %.5g: plain linear elements are too stiff there; use %s",
              (long long)stiff, uz_element_name((uz_element_kind)mesh->kind[stiff]), poisson,
-             mesh->dim == 2 ? d->large ? "tri6 or quad8" : "quad4 with bbar, tri6 or quad8"
-             : d->large     ? "hex20 or tet10"
-                            : "hex8 with bbar, or tet10");
+             mesh->dim == 2 ? "quad4 with bbar, tri6 or quad8" : "hex8 with bbar, or tet10");
     if (mesh->n_unused > 0)
         warn(
             d->out, "unused_nodes", (double)mesh->n_unused,
@@ -683,8 +680,7 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
                       .u = result->u,
                       .r = result->r,
                       .mesh_error = result->summary.discretization_error,
-                      .out = result->evaluation,
-                      .large = true};
+                      .out = result->evaluation};
     look_at_stabilizer(&d);
     look_at_mesh(&d);
 }
@@ -707,7 +703,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
 {
     const uz_summary *s = &result->summary;
     const doubts d = {
-        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation, false};
+        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
     const double slope = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
     if (is_steep(&d, slope))
         look_at_elements(&d, slope);

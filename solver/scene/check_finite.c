@@ -78,10 +78,10 @@ static uz_status check_body(const uz_scene *scene, uz_error *err)
         if (scene->materials[i].poisson == 0.5)
             return uz_fail(err, UZ_ERR_SCENE, UZ_PLACE("materials", i, "poisson"),
                            "finite kinematics have no material that keeps its volume; use less than 0.5, such as 0.49");
-    if (scene->formulation != UZ_FORMULATION_AUTO && scene->formulation != UZ_FORMULATION_STANDARD)
+    if (scene->formulation == UZ_FORMULATION_INCOMPATIBLE)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
-                       "finite kinematics have the standard formulation only; use auto, and quad8 or tri6 for bending "
-                       "and nearly incompressible bodies");
+                       "finite kinematics have no incompatible modes; use auto, and for bending %s",
+                       scene->model == UZ_SOLID ? "hex20 or tet10" : "quad8 or tri6");
     for (int64_t i = 0; i < scene->n_supports && scene->model == UZ_SOLID; i++) {
         const uz_support *support = &scene->supports[i];
         int held = 0, moved = 0;

@@ -75,8 +75,8 @@ def test_a_block_over_a_roller_is_mirrored(s):
 
 def test_the_mesh_has_its_part_of_the_error(s):
     """Against the energy of finer meshes, of prescribed displacements: that of the error, to first order."""
-    def solved(mesh, warns=(), poisson=0.3):
-        _, found = answer(s, block(mesh={"box": {"size": [10, 1], **mesh}}, contacts=[], supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "uy": -5}],
+    def solved(mesh, warns=(), poisson=0.3, **more):
+        _, found = answer(s, block(**more, mesh={"box": {"size": [10, 1], **mesh}}, contacts=[], supports=[{"on": "left", "ux": 0, "uy": 0}, {"on": "right", "uy": -5}],
                                    materials=[{"on": "all", "young": 1, "poisson": poisson, "law": "neo_hooke"}]), "summary")
         summary = found["summary"]
         check(summary["outcome"] == "converged" and summary["error"]["kind"] == "estimated", summary)
@@ -88,8 +88,11 @@ def test_the_mesh_has_its_part_of_the_error(s):
         error, energy, _ = solved({"cells": [10 * cells, cells], "element": element}, warns)
         true = math.sqrt((energy - least) / least)
         check(0.5 * true < error["mesh"] < 2 * true and error["total"] >= error["mesh"], (element, cells, error, true))
-    _, _, warned = solved({"cells": [40, 4], "element": "quad4"}, ["coarse_mesh", "locking"], 0.49)
-    check("use tri6 or quad8" in warned[1]["message"], warned)
+    _, _, warned = solved({"cells": [40, 4], "element": "quad4"}, ["coarse_mesh", "locking"], 0.49, formulation="standard")
+    check("use quad4 with bbar, tri6 or quad8" in warned[1]["message"], warned)
+    _, least, _ = solved({"cells": [80, 8], "element": "quad8"}, poisson=0.49)
+    _, energy, _ = solved({"cells": [40, 4], "element": "quad4"}, ["coarse_mesh"], 0.49)  # with mean dilatation, of itself
+    check(abs(energy - least) < 0.02 * least, (energy, least))
 
 
 def warm_block(model, law, size=1, top=0, temperature=0.0, held=(), **more):
@@ -525,7 +528,7 @@ def test_what_is_not_modelled_is_refused(s):
              (block(model="solid", mesh=CUBE, supports=[{"on": "top", "ux": 0, "uy": -0.1, "uz": 0}],
                     contacts=[{"on": "bottom", "obstacle": {"height": {"x": [0, 1], "y": [0, 1], "z": [[0, 0], [0, 0]]}}}]),
               "/problem/contacts/0/obstacle/height", "cylinders"),
-             (block(formulation="bbar", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
+             (block(formulation="incompatible_modes", mesh={"box": {"size": [1, 1], "cells": [2, 2]}}), "/problem/formulation", "quad8"),
              (block(loads=[{"on": "nowhere", "pressure": 1}]), "/problem/loads/0/on", "right"),
               ({**block(mesh={**BLOCK["problem"]["mesh"], "refine": "auto"}), "solver": {"accuracy": {"total": 0.1, "guaranteed": True}}},
                "/solver/accuracy", "leave guaranteed out")]

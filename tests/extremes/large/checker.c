@@ -38,8 +38,8 @@ typedef struct {
     int nodes;
     double *xyz, *u; /* n x dim */
     int64_t *cell;
-    quad *force, *load; /* n x dim: internal, outer */
-    bool ring;
+    quad *force, *load;  /* n x dim: internal, outer */
+    bool ring, averaged; /* averaged: W is that of F with the mean dilatation */
 } body;
 
 /* ---- reading */
@@ -84,6 +84,8 @@ static void read_body(body *b)
     b->cells = index_below((int64_t)1 << 32);
     b->nodes = b->element[0] == 't' ? 3 : strcmp(b->element, "quad4") == 0 ? 4 : 8;
     b->ring = strcmp(b->model, "axisymmetric") == 0;
+    b->averaged = poisson >= 0.4 && strcmp(b->model, "plane_stress") != 0 &&
+                  (strcmp(b->element, "quad4") == 0 || strcmp(b->element, "hex8") == 0);
     b->xyz = numbers(b->dim * b->n);
     b->cell = malloc((size_t)(b->cells * b->nodes + 1) * sizeof *b->cell);
     if (!b->cell)
@@ -291,18 +293,66 @@ static int rule(quad at[POINTS][3], quad weight[POINTS], const body *b)
     return count;
 }
 
+/* dW/dF of W(s F), s = (theta / J)^(1/n), at a given theta: s (P - t F^-T / n) with P of s F and t = P : F, over the n
+ * directions. Returns dW / dtheta = s t / (n theta). */
+static quad mean_piola(quad P[3][3], const body *b, const point *x, quad theta)
+{
+    const int n = b->dim == 3 || b->ring ? 3 : 2;
+    quad F[3][3], own[3][3], G[3][3], t = 0;
+    memcpy(own, x->F, sizeof own);
+    memcpy(F, x->F, sizeof F);
+    const quad J = cofactors(G, own), s = n == 3 ? cube_root(theta / J) : quad_sqrt(theta / J);
+    for (int i = 0; i < 9; i++)
+        F[i / 3][i % 3] *= i < 8 || n == 3 ? s : 1;
+    (void)piola(P, b, F);
+    for (int i = 0; i < 9; i++)
+        t += i < 8 || n == 3 ? P[i / 3][i % 3] * own[i / 3][i % 3] : 0;
+    for (int i = 0; i < 9; i++)
+        if (i < 8 || n == 3)
+            P[i / 3][i % 3] = s * (P[i / 3][i % 3] - t / n * G[i / 3][i % 3] / J);
+    return s * t / (n * theta);
+}
+
+/* Of a cell whose J are positive the mean of J, and of dW / dtheta. */
+static void find_mean(quad *theta, quad *pressure, const body *b, int64_t e, const quad at[POINTS][3],
+                      const quad weight[POINTS], int count)
+{
+    quad volume = 0, P[3][3], G[3][3];
+    *theta = *pressure = 0;
+    for (int k = 0; k < 2 * count; k++) {
+        point x;
+        deform(&x, b, e, at[k % count]);
+        const quad own = weight[k % count] * x.measure;
+        if (k == count)
+            *theta /= volume;
+        if (k < count)
+            *theta += own * cofactors(G, x.F);
+        else
+            *pressure += own * mean_piola(P, b, &x, *theta) / volume;
+        volume += k < count ? own : 0;
+    }
+}
+
 /* Internal forces. Returns the least J at their points and those of a grid. */
 static quad add_forces(body *b)
 {
-    quad at[POINTS][3] = {{0}}, weight[POINTS], least = INFINITY;
+    quad at[POINTS][3] = {{0}}, weight[POINTS], least = INFINITY, theta = 0, pressure = 0;
     const int count = rule(at, weight, b), grid = b->nodes == 3 ? 0 : b->dim == 3 ? GRID * GRID * GRID : GRID * GRID;
     for (int64_t e = 0; e < b->cells; e++) {
-        quad P[3][3];
+        quad P[3][3], G[3][3];
         point x;
+        if (b->averaged)
+            find_mean(&theta, &pressure, b, e, at, weight, count);
         for (int k = 0; k < count; k++) {
             deform(&x, b, e, at[k]);
             const quad J = piola(P, b, x.F);
             least = J < least ? J : least;
+            if (b->averaged && J > 0) {
+                (void)mean_piola(P, b, &x, theta);
+                (void)cofactors(G, x.F);
+                for (int i = 0; i < 9; i++)
+                    P[i / 3][i % 3] += pressure * G[i / 3][i % 3];
+            }
             for (int a = 0; a < b->nodes && J > 0; a++)
                 for (int i = 0; i < b->dim; i++) {
                     quad sum = b->ring && i == 0 ? P[2][2] * x.around[a] : 0;

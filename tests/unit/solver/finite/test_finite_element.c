@@ -174,6 +174,87 @@ TEST(forces_and_tangents_of_elements_are_derivatives)
     CHECK_MSG(compared > 100, "%d", compared);
 }
 
+/* Of mean dilatation: the same; at rest it is that of small strain, where n is 2 in plane strain, too. */
+TEST(mean_dilatation_has_an_energy)
+{
+    qp_random rng = {14};
+    int compared = 0;
+    for (int k = 0; k < 36; k++) {
+        double xyz[MOST], u[MOST], ke[MOST * MOST], other[MOST * MOST];
+        const bool solid = k % 3 == 0, ring = k % 3 == 1;
+        uz_element element = bent_element(xyz, solid ? UZ_HEX8 : UZ_QUAD4, &rng);
+        const uz_elasticity law = (uz_elasticity)(1 + k / 3 % 3);
+        const int n = solid ? 24 : 8;
+        uz_finite_forces at, side[2];
+        element.formulation = UZ_FORMULATION_BBAR;
+        element.lame.lambda = 20;
+        for (int a = 0; a < 4 && ring; a++)
+            xyz[2 * a] = k % 2 ? xyz[2 * a] + 2 : fmax(0, xyz[2 * a] + 1);
+        if (ring)
+            element.model = UZ_AXISYMMETRIC;
+        for (int i = 0; i < n; i++)
+            u[i] = any(&rng, solid ? 0.06 : 0.15);
+        if (k >= 27) /* warm */
+            uz_finite_warm(&element, xyz, u, 0.05);
+        if (!evaluate(&at, ke, &element, law, u, NULL))
+            continue;
+        compared++;
+        for (int j = 0; j < n; j++) {
+            const double h = 1e-6, before = u[j];
+            for (int s = 0; s < 2; s++) {
+                u[j] = before + (s ? h : -h);
+                CHECK(evaluate(&side[s], NULL, &element, law, u, NULL));
+            }
+            u[j] = before;
+            CHECK_MSG(fabs((side[1].energy - side[0].energy) / (2 * h) - at.force[j]) < 1e-6, "%d: %g", k, at.force[j]);
+            for (int i = 0; i < n; i++)
+                CHECK_MSG(fabs((side[1].force[i] - side[0].force[i]) / (2 * h) - ke[i * n + j]) < (ring ? 1e-4 : 1e-5),
+                          "%d: %g", k, ke[i * n + j]);
+        }
+        if (k >= 27)
+            continue;
+        memset(u, 0, sizeof u);
+        CHECK(evaluate(&at, ke, &element, law, u, NULL) && fabs(at.energy) < 1e-13);
+        CHECK_INT(uz_element_stiffness(other, &element), UZ_SHAPE_GOOD);
+        for (int i = 0; i < n * n; i++)
+            CHECK(fabs(ke[i] - other[i]) < 1e-11 * (ring ? 20 : 1));
+    }
+    CHECK_MSG(compared > 30, "%d", compared);
+}
+
+/* Of mean dilatation Cauchy's stress has one pressure in the element, K (theta - 1) of the isochoric law; where F is
+ * the same everywhere all is as without. */
+TEST(mean_dilatation_has_one_pressure)
+{
+    static const double POINT[2][3] = {{0.3, -0.6, 0.2}, {-0.7, 0.5, -0.4}};
+    qp_random rng = {15};
+    for (int k = 0; k < 12; k++) {
+        double xyz[MOST], u[MOST];
+        uz_element element = bent_element(xyz, k % 2 ? UZ_HEX8 : UZ_QUAD4, &rng);
+        const int dim = k % 2 ? 3 : 2, n = dim * uz_element_node_count(element.kind);
+        const bool even = k >= 6;
+        double H[3][3], pressure[2];
+        uz_finite_state state[2];
+        for (int i = 0; i < 9; i++)
+            H[i / 3][i % 3] = any(&rng, 0.1);
+        for (int i = 0; i < n; i++) {
+            u[i] = even ? 0 : any(&rng, 0.05);
+            for (int j = 0; j < dim; j++)
+                u[i] += H[i % dim][j] * xyz[i / dim * dim + j];
+        }
+        for (int s = 0; s < 2; s++) {
+            element.formulation = even && s ? UZ_FORMULATION_STANDARD : UZ_FORMULATION_BBAR;
+            uz_finite_state_at(&state[s], &element, UZ_ELASTIC_NEO_HOOKE_ISOCHORIC, u, POINT[even ? 0 : s]);
+            pressure[s] = (state[s].stress[0] + state[s].stress[1] + state[s].stress[2]) / 3;
+        }
+        CHECK_MSG(fabs(pressure[0] - pressure[1]) < 1e-13, "%d: %g, %g", k, pressure[0], pressure[1]);
+        for (int c = 0; c < 6 && even; c++)
+            CHECK(fabs(state[0].stress[c] - state[1].stress[c]) < 1e-13 &&
+                  fabs(state[0].strain[c] - state[1].strain[c]) < 1e-13);
+        CHECK(even || fabs(state[0].stress[0] - state[1].stress[0]) > 1e-5);
+    }
+}
+
 /* Turned and carried off, an element has its energy, and its forces turn along; Cauchy's stress does, too. */
 TEST(rotations_strain_nothing)
 {
@@ -263,9 +344,10 @@ TEST(rotations_of_solids_strain_nothing)
 TEST(a_step_along_a_turn_leaves_no_stress_in_the_tangent)
 {
     qp_random rng = {12};
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 5; k++) { /* the last with mean dilatation */
         double xyz[MOST], u[MOST], plain[MOST * MOST], stepped[MOST * MOST], sum = 0;
-        const uz_element element = bent_element(xyz, KINDS[k], &rng);
+        uz_element element = bent_element(xyz, k < 4 ? KINDS[k] : UZ_QUAD4, &rng);
+        element.formulation = k < 4 ? UZ_FORMULATION_STANDARD : UZ_FORMULATION_BBAR;
         const int n = 2 * uz_element_node_count(element.kind);
         const double w = 0.3, stress = (element.lame.lambda + element.lame.mu) * w * w;
         uz_finite_forces at;

@@ -24,7 +24,7 @@ static uz_scene scene_of(uz_element_kind kind, int way)
     const bool solid = uz_element_type_of(kind)->dim == 3;
     uz_scene s = body_scene(solid ? UZ_SOLID : PLANE[way % 3], uz_element_name(kind), (double[3]){5, 3, 2},
                             (int64_t[3]){4, 3, 2});
-    s.formulation = UZ_FORMULATION_STANDARD;
+    s.formulation = way > 2 && (kind == UZ_QUAD4 || kind == UZ_HEX8) ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
     s.kinematics = UZ_KINEMATICS_FINITE;
     s.box.grading[0] = way % 2 ? 1.7 : 1;
     s.box.origin[0] = 1;

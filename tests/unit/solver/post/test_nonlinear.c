@@ -63,7 +63,8 @@ static double least_modulus(uz_model model, const uz_lame *lame)
     return 1 / softest;
 }
 
-static void add_point(integrals *to, const uz_element *element, double volume, double H[3][3])
+/* mean: of mean dilatation the traces of e and Q; NULL: their own. */
+static void add_point(integrals *to, const uz_element *element, double volume, double H[3][3], const double *mean)
 {
     double Q[3][3] = {{0}}, e[3][3], of_Q[3][3], of_e[3][3], across, unused;
     const int size = uz_stress_count(element->model) == 3 ? 2 : 3;
@@ -74,6 +75,12 @@ static void add_point(integrals *to, const uz_element *element, double volume, d
             e[i][j] = 0.5 * (H[i][j] + H[j][i]);
             to->turns += 0.25 * volume * (H[i][j] - H[j][i]) * (H[i][j] - H[j][i]);
         }
+    for (int k = 0; k < 2 && mean; k++) {
+        double(*of)[3] = k ? Q : e;
+        const double lacks = mean[k] - of[0][0] - of[1][1] - (size == 3 ? of[2][2] : 0);
+        for (int i = 0; i < size; i++)
+            of[i][i] += lacks / size;
+    }
     stress_tensor(of_Q, &unused, element->model, &element->lame, Q);
     stress_tensor(of_e, &across, element->model, &element->lame, e);
     const double square = product(H, H) + across * across;
@@ -86,7 +93,7 @@ static void add_point(integrals *to, const uz_element *element, double volume, d
         to->stress[i / 3][i % 3] += volume * of_e[i / 3][i % 3];
 }
 
-/* NaN where an element is not of the standard formulation. */
+/* NaN where an element has incompatible modes. */
 static double plain_measure(const uz_body_model *model, const double *u, double energy)
 {
     integrals all = {0};
@@ -97,10 +104,13 @@ static double plain_measure(const uz_body_model *model, const double *u, double 
         int nodes;
         const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
         uz_body_element(&element, xyz, model, e);
-        if (element.formulation != UZ_FORMULATION_STANDARD)
+        if (element.formulation == UZ_FORMULATION_INCOMPATIBLE)
             return NAN;
         const uz_gauss_rule *rule = uz_element_rule(element.kind, element.model);
-        for (int g = 0; g < rule->count; g++) {
+        const bool averaged = element.formulation == UZ_FORMULATION_BBAR;
+        double mean[2] = {0}, volume = 0;
+        for (int k = averaged ? 0 : rule->count; k < 2 * rule->count; k++) {
+            const int g = k % rule->count;
             double H[3][3] = {{0}};
             const double det = uz_element_gradients(grad, &element, rule->point[g].at);
             const double depth = uz_element_around(around, &element, grad, rule->point[g].at);
@@ -110,7 +120,15 @@ static double plain_measure(const uz_body_model *model, const double *u, double 
                 if (model->kind == UZ_AXISYMMETRIC)
                     H[2][2] += u[dim * node[a]] * around[a];
             }
-            add_point(&all, &element, rule->point[g].weight * det * depth, H);
+            const double own = rule->point[g].weight * det * depth;
+            if (k >= rule->count) {
+                add_point(&all, &element, own, H, averaged ? (double[]){mean[0] / volume, mean[1] / volume} : NULL);
+                continue;
+            }
+            volume += own;
+            mean[0] += own * (H[0][0] + H[1][1] + H[2][2]);
+            for (int i = 0; i < 9; i++)
+                mean[1] += own * H[i / 3][i % 3] * H[i / 3][i % 3];
         }
     }
     double principal[3], stress[STRESSES] = {all.stress[0][0], all.stress[1][1], all.stress[2][2],
