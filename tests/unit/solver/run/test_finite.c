@@ -190,39 +190,6 @@ TEST(a_block_over_a_roller_is_mirrored)
     }
 }
 
-/* A cantilever over a plane that falls away: rows at its root are those within reach at first, and its end is where it
- * comes to lie. */
-TEST(a_row_that_was_far_presses)
-{
-    uz_scene s = block("quad8", 10, 0.2, 20, 1, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
-    s.materials[0].young = 1.2e6;
-    body_hold(&s, "left", 0, 0, NAN);
-    body_load(&s, UZ_LOAD_FORCE, "right", 0, -20, 0);
-    body_plane(&s, "bottom", (double[3]){0, -0.05, 0}, (double[3]){0.1, 1, 0});
-    uz_result *result = solve(&s);
-    check_converged(result, 1, 6);
-    const double *end = moved_by(result, 10, 0);
-    CHECK_MSG(fabs(end[1] + 0.05 + 0.1 * (10 + end[0])) < 1e-8, "%.9g", end[1]);
-    CHECK(result->summary.active == 1 && result->summary.force[1] > 1 && result->summary.force[1] < 20);
-    give_back(result, &s);
-}
-
-/* What a pressure that follows the body adds to a step is found with the rows of its contact problem, of which most are
- * far from the roller. */
-TEST(a_pressed_strip_over_a_roller_takes_few_problems)
-{
-    uz_scene s = block("quad4", 8, 1, 44, 3, UZ_ELASTIC_ST_VENANT_KIRCHHOFF);
-    body_hold(&s, "left", 0, 0, NAN);
-    body_load(&s, UZ_LOAD_PRESSURE, "top", 0.00225, 0, 0);
-    uz_contact *roller = body_plane(&s, "bottom", (double[3]){6.5, -2.8, 0}, (double[3]){0, 1, 0});
-    roller->kind = UZ_OBSTACLE_ROUND;
-    roller->radius = 2.8;
-    uz_result *result = solve(&s);
-    check_converged(result, 1, 5);
-    CHECK(result->summary.active > 0);
-    give_back(result, &s);
-}
-
 static void bend(double x[3])
 {
     const double r = x[0], angle = x[1];
