@@ -31,6 +31,15 @@ void uz_candidates_clear(uz_candidates *candidates)
     memset(candidates, 0, sizeof *candidates);
 }
 
+void uz_gap_sizes(double *size, const double *h, const uz_csc *N, const double *u)
+{
+    for (int64_t i = 0; i < N->rows; i++)
+        size[i] = fabs(h[i]);
+    for (int64_t j = 0; j < N->cols; j++)
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+            size[N->idx[q]] += fabs(N->val[q] * u[j]);
+}
+
 int64_t uz_candidates_extend(uz_candidates *candidates, const uz_law *law, const double *g, const double *size,
                              double rounding)
 {

@@ -28,6 +28,8 @@
 #include "law/law.h"
 #include "uzawa.h"
 
+#include <float.h>
+
 /* The part of a body's extent by which its points are first expected to come closer to an obstacle. What
  * strains and rotations of one part in a hundred make of it together: beyond that they are not small any more. */
 #define UZ_CANDIDATES_REACH 0.02
@@ -42,6 +44,10 @@ typedef struct {
  * INFINITY takes all. Error: UZ_ERR_MEMORY. */
 uz_status uz_candidates_first(uz_candidates *out, const double *h, int64_t m, double reach, uz_error *err);
 void uz_candidates_clear(uz_candidates *candidates);
+
+/* Gaps left out may be negative by this part of what they are the difference of, h - N u: size (m) = |h| + |N| |u|. */
+#define UZ_GAP_ROUNDING (64 * DBL_EPSILON)
+void uz_gap_sizes(double *size, const double *h, const uz_csc *N, const double *u);
 
 /* Takes in every row whose gap g (m, all rows, at the reduced problem's answer) is negative by more than `rounding`
  * times size_i, size_i >= the terms that g_i is the difference of; a gap that is no number counts as negative. With

@@ -10,12 +10,8 @@
 #include "run/rows.h"
 #include "run/run.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
-
-/* Gaps left out may be negative by this part of what they are the difference of. */
-#define ROUNDING (64.0 * DBL_EPSILON)
 
 /* The rows of another round: those of this one, those that are penetrated, and those that would be next. */
 static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
@@ -23,7 +19,7 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     const uz_candidates *rows = &run->asked->setup->rows;
     const uz_csc *N = uz_setup_all_rows(run->asked->setup, run->asked->problem);
     const uz_law *law = run->work.it.law;
-    const double *u = run->answer.u, *g = run->answer.g;
+    const double *g = run->answer.g;
     double nearest = INFINITY;
     uz_candidates wants = {0};
     double *size = uz_alloc(rows->m, sizeof *size);
@@ -32,12 +28,8 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     if (status == UZ_OK)
         status = uz_candidates_add(&wants, rows, err);
     if (status == UZ_OK) {
-        for (int64_t i = 0; i < rows->m; i++) /* what each gap is the difference of: |h| + |N| |u| */
-            size[i] = fabs(run->load.h_all[i]);
-        for (int64_t j = 0; j < N->cols; j++)
-            for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
-                size[N->idx[q]] += fabs(N->val[q] * u[j]);
-        const int64_t added = uz_candidates_extend(&wants, law, g, size, ROUNDING);
+        uz_gap_sizes(size, run->load.h_all, N, run->answer.u);
+        const int64_t added = uz_candidates_extend(&wants, law, g, size, UZ_GAP_ROUNDING);
         /* no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest */
         for (int64_t i = 0; added == 0 && suspect && i < wants.m; i++) {
             double depth;

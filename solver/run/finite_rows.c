@@ -12,8 +12,6 @@
 #include "law/law.h"
 #include "linalg/linalg.h"
 
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,8 +23,6 @@ enum { FEW_ROWS = 32 };
 /* What is within reach of an answer of the same part, in parts of the body's extent: of a ring between plates that is
  * pressed to half of its height, and rollers that a body is pressed on, rows that pressed next had 0.0064 at most. */
 #define NEXT_REACH 0.01
-/* Gaps left out may be negative by this part of what they are the difference of. */
-#define ROUNDING (64 * DBL_EPSILON)
 
 static void take_all(uz_finite_run *run)
 {
@@ -114,25 +110,15 @@ static uz_status look_at_rest(bool *again, uz_finite_run *run, uz_error *err)
     double *r = uz_alloc(m, sizeof *r), *g = uz_alloc(m, sizeof *g), *size = uz_alloc(m, sizeof *size);
     *again = false;
     if (!r || !g || !size) {
-        free(r);
-        free(g);
-        free(size);
+        uz_free_all(r, g, size);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)m);
     }
     uz_candidates_scatter(r, last->r, &run->kept);
-    for (int64_t i = 0; i < m; i++) {
-        g[i] = run->at.h[i];
-        size[i] = fabs(g[i]);
-    }
-    for (int64_t j = 0; j < N->cols; j++)
-        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
-            g[N->idx[q]] -= N->val[q] * last->u[j];
-            size[N->idx[q]] += fabs(N->val[q] * last->u[j]);
-        }
-    *again = uz_candidates_extend(&run->kept, &uz_law_frictionless, g, size, ROUNDING) > 0;
-    free(size);
-    free(last->r);
-    free(last->g);
+    memcpy(g, run->at.h, (size_t)m * sizeof *g);
+    uz_csc_gaxpy(g, N, -1, last->u);
+    uz_gap_sizes(size, run->at.h, N, last->u);
+    *again = uz_candidates_extend(&run->kept, &uz_law_frictionless, g, size, UZ_GAP_ROUNDING) > 0;
+    uz_free_all(size, last->r, last->g);
     last->r = r;
     last->g = g;
     last->m = m;
