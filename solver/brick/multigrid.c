@@ -310,13 +310,17 @@ typedef struct {
     int slabs;
 } passage;
 
-/* Those of planes first to end - 1, which the slab has. */
-static const int64_t *dofs_of_slab(const passage *p, int slab, int64_t *first, int64_t *end)
+/* Each line of nodes of a slab's planes, by its dofs and where its first number stands. */
+static void pass_lines(const passage *p, int slab,
+                       void (*pass)(const passage *p, const int64_t *dof, int64_t at, int64_t nodes))
 {
-    const int64_t *cells = p->mg->level[0].cells;
-    *first = uz_brick_slab(cells[2] + 1, slab, p->slabs);
-    *end = uz_brick_slab(cells[2] + 1, slab + 1, p->slabs);
-    return p->mg->brick->dof + 3 * (cells[0] + 1) * (cells[1] + 1) * *first;
+    const uz_brick_level *level = &p->mg->level[0];
+    const int64_t nodes = level->cells[0] + 1, lines = level->cells[1] + 1, planes = level->cells[2] + 1;
+    const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
+    const int64_t *dof = p->mg->brick->dof + 3 * nodes * lines * first;
+    for (int64_t k = first; k < end; k++)
+        for (int64_t j = 0; j < lines; j++, dof += 3 * nodes)
+            pass(p, dof, k * level->plane + j * level->stride, nodes);
 }
 
 /* Nodes `begin` to end - 1 of a line, whose first number stands at `at`. */
@@ -330,32 +334,29 @@ static void read_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t
         }
 }
 
+static void read_line(const passage *p, const int64_t *dof, int64_t at, int64_t nodes)
+{
+    const double factor = p->factor;
+    const int64_t size = p->mg->level[0].size;
+    int64_t begin, end;
+    uz_brick_run(&begin, &end, dof, nodes);
+    read_nodes(p, dof, at, 0, begin);
+    read_nodes(p, dof, at, end, nodes);
+    if (begin == end)
+        return;
+    const double *restrict r = p->r + dof[3 * begin];
+    const float *x_free = p->v->inverse + at + begin, *y_free = x_free + size, *z_free = y_free + size;
+    float *restrict x = p->v->b + at + begin, *restrict y = x + size, *restrict z = y + size;
+    for (int64_t i = 0; i < end - begin; i++) {
+        x[i] = x_free[i] != 0.0F ? (float)(factor * r[3 * i]) : 0.0F;
+        y[i] = y_free[i] != 0.0F ? (float)(factor * r[3 * i + 1]) : 0.0F;
+        z[i] = z_free[i] != 0.0F ? (float)(factor * r[3 * i + 2]) : 0.0F;
+    }
+}
+
 static void read_slab(void *ctx, int slab)
 {
-    const passage *p = ctx;
-    const double factor = p->factor;
-    const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, size = level->size;
-    int64_t first, last;
-    const int64_t *dof = dofs_of_slab(p, slab, &first, &last);
-    for (int64_t k = first; k < last; k++)
-        for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
-            const int64_t at = k * level->plane + j * level->stride;
-            int64_t begin, end;
-            uz_brick_run(&begin, &end, dof, line);
-            read_nodes(p, dof, at, 0, begin);
-            read_nodes(p, dof, at, end, line);
-            if (begin == end)
-                continue;
-            const double *restrict r = p->r + dof[3 * begin];
-            const float *x_free = p->v->inverse + at + begin, *y_free = x_free + size, *z_free = y_free + size;
-            float *restrict x = p->v->b + at + begin, *restrict y = x + size, *restrict z = y + size;
-            for (int64_t i = 0; i < end - begin; i++) {
-                x[i] = x_free[i] != 0.0F ? (float)(factor * r[3 * i]) : 0.0F;
-                y[i] = y_free[i] != 0.0F ? (float)(factor * r[3 * i + 1]) : 0.0F;
-                z[i] = z_free[i] != 0.0F ? (float)(factor * r[3 * i + 2]) : 0.0F;
-            }
-        }
+    pass_lines(ctx, slab, read_line);
 }
 
 static void write_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t begin, int64_t end)
@@ -366,31 +367,28 @@ static void write_nodes(const passage *p, const int64_t *dof, int64_t at, int64_
                 p->z[dof[3 * i + c]] = p->factor * (double)p->v->x[c * p->mg->level[0].size + at + i];
 }
 
+static void write_line(const passage *p, const int64_t *dof, int64_t at, int64_t nodes)
+{
+    const double factor = p->factor;
+    const int64_t size = p->mg->level[0].size;
+    int64_t begin, end;
+    uz_brick_run(&begin, &end, dof, nodes);
+    write_nodes(p, dof, at, 0, begin);
+    write_nodes(p, dof, at, end, nodes);
+    if (begin == end)
+        return;
+    const float *restrict x = p->v->x + at + begin, *restrict y = x + size, *restrict z = y + size;
+    double *restrict to = p->z + dof[3 * begin];
+    for (int64_t i = 0; i < end - begin; i++) {
+        to[3 * i] = factor * (double)x[i];
+        to[3 * i + 1] = factor * (double)y[i];
+        to[3 * i + 2] = factor * (double)z[i];
+    }
+}
+
 static void write_slab(void *ctx, int slab)
 {
-    const passage *p = ctx;
-    const double factor = p->factor;
-    const uz_brick_level *level = &p->mg->level[0];
-    const int64_t lines = level->cells[1] + 1, line = level->cells[0] + 1, size = level->size;
-    int64_t first, last;
-    const int64_t *dof = dofs_of_slab(p, slab, &first, &last);
-    for (int64_t k = first; k < last; k++)
-        for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
-            const int64_t at = k * level->plane + j * level->stride;
-            int64_t begin, end;
-            uz_brick_run(&begin, &end, dof, line);
-            write_nodes(p, dof, at, 0, begin);
-            write_nodes(p, dof, at, end, line);
-            if (begin == end)
-                continue;
-            const float *restrict x = p->v->x + at + begin, *restrict y = x + size, *restrict z = y + size;
-            double *restrict to = p->z + dof[3 * begin];
-            for (int64_t i = 0; i < end - begin; i++) {
-                to[3 * i] = factor * (double)x[i];
-                to[3 * i + 1] = factor * (double)y[i];
-                to[3 * i + 2] = factor * (double)z[i];
-            }
-        }
+    pass_lines(ctx, slab, write_line);
 }
 
 double uz_brick_read(const uz_brick_grids *mg, const uz_multigrid_room *room, const double *r)
