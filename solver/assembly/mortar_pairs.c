@@ -383,23 +383,18 @@ static void measure_zones(zone_mark *mark, int64_t count, const int64_t *zone, c
 
 /* What holds the parts of the body that zones are of: it tells equal ones that are shifted against each other, as a
  * half turn makes one of the other. False: no memory. */
-static bool measure_parts(zone_mark *mark, int64_t count, const int64_t *zone, const uz_mortar_pair *pair)
+static bool measure_parts(zone_mark *mark, const int64_t *zone, const uz_mortar_pair *pair)
 {
     const uz_body_model *model = pair->in->model;
     const uz_mesh *mesh = &model->mesh;
-    int64_t *part = uz_alloc(mesh->n_nodes, sizeof *part), *of_zone = uz_alloc(count, sizeof *of_zone);
-    const bool room = part && of_zone && uz_mesh_number_parts(part, mesh) >= 0;
+    int64_t *part = uz_alloc(mesh->n_nodes, sizeof *part), *fixed = uz_alloc_zero(mesh->n_nodes, sizeof *fixed);
+    const bool room = part && fixed && uz_mesh_number_parts(part, mesh) >= 0;
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && room; i++)
+        fixed[part[i / mesh->dim]] += model->dof[i] < 0 || uz_is_rigid(model, i / mesh->dim);
     for (int64_t i = 0; i < pair->surface.n && room; i++)
-        of_zone[zone[i]] = part[pair->surface.side[i].node[0]];
-    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && room; i++) {
-        const int64_t a = i / mesh->dim;
-        if (model->dof[i] >= 0 && !uz_is_rigid(model, a))
-            continue;
-        for (int64_t z = 0; z < count; z++)
-            mark[z].fixed += of_zone[z] == part[a];
-    }
+        mark[zone[i]].fixed = fixed[part[pair->surface.side[i].node[0]]];
     free(part);
-    free(of_zone);
+    free(fixed);
     return room;
 }
 
@@ -428,7 +423,7 @@ static bool order_zones(int64_t *zone, bool *bound, int64_t count, const uz_mort
     }
     if (room && count > 1 && mark[0].area > 0 && are_alike(mark, count)) {
         measure_zones(mark, count, zone, pair);
-        room = measure_parts(mark, count, zone, pair);
+        room = measure_parts(mark, zone, pair);
         qsort(mark, (size_t)count, sizeof *mark, by_order);
     }
     for (int64_t z = 0; z < count && room; z++) {
