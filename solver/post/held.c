@@ -6,6 +6,7 @@
 #include "post/parts.h"
 
 #include "assembly/parts.h"
+#include "core/vector3.h"
 
 #include <math.h>
 #include <string.h>
@@ -34,7 +35,7 @@ void uz_held_part(double out[3], const uz_support *support, int dim, const doubl
     for (int c = 0; c < DIM; c++)
         out[c] = 0;
     for (int i = 0; i < n; i++) {
-        const double along = d[i][0] * v[0] + d[i][1] * v[1] + d[i][2] * v[2];
+        const double along = uz_dot3(d[i], v);
         for (int c = 0; c < DIM; c++)
             out[c] += along * d[i][c];
     }
@@ -46,11 +47,11 @@ static void extend(double q[DIM][DIM], int *n, const double d[DIM])
     double rest[DIM] = {d[0], d[1], d[2]};
     for (int pass = 0; pass < 2; pass++) /* twice: orthogonal to rounding (Giraud et al., Numer. Math. 101 (2005) 87) */
         for (int i = 0; i < *n; i++) {
-            const double s = rest[0] * q[i][0] + rest[1] * q[i][1] + rest[2] * q[i][2];
+            const double s = uz_dot3(rest, q[i]);
             for (int c = 0; c < DIM; c++)
                 rest[c] -= s * q[i][c];
         }
-    const double length = sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
+    const double length = sqrt(uz_dot3(rest, rest));
     if (*n == DIM || length <= UZ_DEPENDENT)
         return;
     for (int c = 0; c < DIM; c++)
@@ -73,9 +74,9 @@ void uz_held_share(double out[3], const uz_scene *scene, int dim, const int32_t 
             double part[DIM];
             uz_held_part(part, &scene->supports[support[s]], dim, q[j]);
             for (int i = 0; i < n; i++)
-                G[i][j] += q[i][0] * part[0] + q[i][1] * part[1] + q[i][2] * part[2];
+                G[i][j] += uz_dot3(q[i], part);
         }
-        y[j] = q[j][0] * v[0] + q[j][1] * v[1] + q[j][2] * v[2];
+        y[j] = uz_dot3(q[j], v);
     }
     for (int j = 0; j < n; j++) /* G in that basis, which is positive definite */
         for (int i = j + 1; i < n; i++) {
