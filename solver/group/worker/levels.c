@@ -496,11 +496,7 @@ static void sum_up(double *x, int64_t n)
                         &request);
         wait_for(1, &request);
     }
-    free(count);
-    free(first);
-    free(mine);
-    free(place);
-    free(parts);
+    uz_free_all(count, first, mine, place, parts);
 }
 
 static uz_team team_of(const spread_system *s)
