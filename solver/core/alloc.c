@@ -1,6 +1,8 @@
 #include "core/alloc.h"
 
+#include <errno.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 
@@ -15,6 +17,17 @@ static bool bytes_for(int64_t count, size_t size, size_t *bytes)
 
 #define HUGE_PAGE ((size_t)2 << 20)
 
+/* Asks for huge pages wherever the block has a part of one: beside it is heap, which other blocks have, or nothing,
+ * which is told as ENOMEM and is no lack of memory. Where that is refused small pages do. */
+static void ask_for_huge_pages(void *block, size_t bytes)
+{
+    const uintptr_t first = (uintptr_t)block & ~(HUGE_PAGE - 1),
+                    end = ((uintptr_t)block + bytes + HUGE_PAGE - 1) & ~(HUGE_PAGE - 1);
+    const int error = errno;
+    madvise((void *)first, end - first, MADV_HUGEPAGE);
+    errno = error;
+}
+
 void *uz_malloc_huge(size_t bytes)
 {
     void *block = NULL;
@@ -22,7 +35,7 @@ void *uz_malloc_huge(size_t bytes)
         return malloc(bytes);
     if (posix_memalign(&block, HUGE_PAGE, bytes) != 0)
         return NULL;
-    madvise(block, bytes, MADV_HUGEPAGE); /* a wish: where it is refused, small pages do */
+    ask_for_huge_pages(block, bytes);
     return block;
 }
 
@@ -35,7 +48,10 @@ void *uz_alloc(int64_t count, size_t size)
 void *uz_alloc_zero(int64_t count, size_t size)
 {
     size_t bytes;
-    return bytes_for(count, size, &bytes) ? calloc(1, bytes) : NULL;
+    void *block = bytes_for(count, size, &bytes) ? calloc(1, bytes) : NULL;
+    if (block && bytes >= HUGE_PAGE)
+        ask_for_huge_pages(block, bytes);
+    return block;
 }
 
 void *uz_realloc(void *block, int64_t count, size_t size)

@@ -13,8 +13,9 @@ void *uz_alloc_zero(int64_t count, size_t size);
 
 /* malloc for big blocks: from UZ_HUGE_LEAST bytes on they start on a huge page boundary and ask the kernel for huge
  * pages. A factor of 200 MB is touched once, page by page: with 4 kB pages a fifth of its time went into page faults.
- * Free with free(). */
-#define UZ_HUGE_LEAST ((size_t)8 << 20)
+ * Zeroed ones ask for them, too: what is read before it is written has two faults a page, the second of which stops
+ * all threads of the process. Free with free(). */
+#define UZ_HUGE_LEAST ((size_t)4 << 20)
 void *uz_malloc_huge(size_t bytes);
 
 /* Grows or shrinks; on failure NULL and the old block stays. */
