@@ -619,7 +619,9 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
     const uz_mesh *mesh = &model->mesh;
     energy_sum sum = {.model = model, .nodal = nodal, .carried = carried};
     sum.by_strains = carried || !mesh->uniform || model->kind == UZ_AXISYMMETRIC;
-    if (mesh->n_elements < WORTH_SHARING)
+    if (model->brick && !sum.by_strains)
+        sum.status[0] = uz_brick_energy(&sum.twice[0], model->brick, nodal, &sum.err[0]);
+    else if (mesh->n_elements < WORTH_SHARING)
         add_share(&sum, 1);
     else
         uz_aside_share(add_share, &sum, SHARES);

@@ -172,6 +172,7 @@ typedef struct {
     double *y;
     const uz_brick *brick;
     const double *block, *x, *value;
+    const double *nodal; /* the displacement by node, in place of x and value */
     uz_brick_product *room;
     int slabs;
     bool sums; /* x'y is wanted */
@@ -192,17 +193,19 @@ static void unpack_nodes(double *to, const product *p, const int64_t *dof, int64
 static void unpack(double *plane, const product *p, int64_t k)
 {
     const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1, apart = p->room->plane;
-    const int64_t *dof = p->brick->dof + 3 * line * lines * k;
-    for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
+    for (int64_t j = 0; j < lines; j++) {
+        const int64_t first = 3 * line * (lines * k + j), *dof = p->brick->dof + first;
         double *to = plane + j * p->room->stride;
-        int64_t begin = 0, end = 0;
+        int64_t begin = 0, end = p->nodal ? line : 0;
         if (p->x)
             uz_brick_run(&begin, &end, dof, line);
-        unpack_nodes(to, p, dof, 0, begin);
-        unpack_nodes(to, p, dof, end, line);
+        if (!p->nodal) {
+            unpack_nodes(to, p, dof, 0, begin);
+            unpack_nodes(to, p, dof, end, line);
+        }
         if (begin == end)
             continue;
-        const double *restrict from = p->x + dof[3 * begin];
+        const double *restrict from = p->nodal ? p->nodal + first : p->x + dof[3 * begin];
         double *restrict x = to + begin, *restrict y = x + apart, *restrict z = y + apart;
         for (int64_t i = 0; i < end - begin; i++) {
             x[i] = from[3 * i];
@@ -273,7 +276,7 @@ static void layer_narrow(const uz_brick_product *room, struct uz_brick_product_r
     layer(room, of, brick, block);
 }
 
-/* What a plane adds to x'y, which is 0 at dofs that are supported. */
+/* What a plane adds to x'y, where dofs that are supported and do not move count for nothing. */
 static double along_plane(const struct uz_brick_product_room *of, int64_t n)
 {
     lanes sum[2] = {{0.0}};
@@ -308,7 +311,7 @@ static void multiply_slab(void *ctx, int slab)
             unpack(of->in[1], p, k + 1);
             p->layer(p->room, of, p->brick, p->block);
         }
-        if (k >= first)
+        if (k >= first && p->y)
             pack(p, k, of->out[0]);
         if (k >= first && p->sums)
             p->room->of_plane[k] = along_plane(of, 3 * p->room->plane);
@@ -330,13 +333,32 @@ void uz_brick_multiply(double *y, const uz_brick *brick, const double *block, uz
     share(&(product){.y = y, .brick = brick, .block = block, .x = x, .value = value, .room = room});
 }
 
-double uz_brick_curve(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x)
+/* The sum of what all planes have. */
+static double share_sum(product *p)
 {
     double sum = 0.0;
-    share(&(product){.y = y, .brick = brick, .block = block, .x = x, .room = room, .sums = true});
-    for (int64_t k = 0; k <= brick->cells[2]; k++)
-        sum += room->of_plane[k];
+    p->sums = true;
+    share(p);
+    for (int64_t k = 0; k <= p->brick->cells[2]; k++)
+        sum += p->room->of_plane[k];
     return sum;
+}
+
+double uz_brick_curve(double *y, const uz_brick *brick, const double *block, uz_brick_product *room, const double *x)
+{
+    return share_sum(&(product){.y = y, .brick = brick, .block = block, .x = x, .room = room});
+}
+
+uz_status uz_brick_energy(double *twice, const uz_brick *brick, const double *nodal, uz_error *err)
+{
+    uz_brick_product room = {.stride = 0};
+    double block[9 * UZ_BRICK_PARITIES];
+    const bool ok = uz_brick_product_init(&room, brick);
+    (void)uz_brick_blocks(block, brick->ke, 1.0);
+    *twice = ok ? share_sum(&(product){.brick = brick, .block = block, .nodal = nodal, .room = &room}) : 0.0;
+    uz_brick_product_clear(&room);
+    return ok ? UZ_OK
+              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the energy of %lld nodes", (long long)brick->n_nodes);
 }
 
 uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double *value, uz_error *err)

@@ -23,6 +23,8 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err);
 /* p (d) -= what cells do to free dofs where supported ones are moved by `value` (by support, as uz_body_model numbers
  * them: dof -1 - k is moved by value[k]). */
 uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double *value, uz_error *err);
+/* *twice = u'Ku over all dofs of the displacement u by node (nodal, n_nodes x 3), supported or not. UZ_ERR_MEMORY. */
+uz_status uz_brick_energy(double *twice, const uz_brick *brick, const double *nodal, uz_error *err);
 
 /* Geometric multigrid on a brick, which has to outlive it: a V-cycle in single precision, with cells twice as long on
  * each next grid, along the axes along which cells are short (Trottenberg, Oosterlee and Schueller, "Multigrid", 5.1),
