@@ -174,8 +174,9 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
         uz_part *p = &parts->list[parts->of[a]];
         p->node = a;
         for (int c = 0; c < mesh->dim; c++) {
-            p->low[c] = fmin(p->low[c], mesh->xyz[a * mesh->dim + c]);
-            p->high[c] = fmax(p->high[c], mesh->xyz[a * mesh->dim + c]);
+            const double at = mesh->xyz[a * mesh->dim + c];
+            p->low[c] = at < p->low[c] ? at : p->low[c];
+            p->high[c] = at > p->high[c] ? at : p->high[c];
         }
     }
     /* a held dof is a direction that supports hold; a spring holds its axes as stiffness */

@@ -74,8 +74,9 @@ uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const 
     for (int axis = 0; axis < info->dim; axis++) { /* the diagonal of the box around the body */
         double low = INFINITY, high = -INFINITY;
         for (int64_t i = 0; i < info->n_nodes; i++) {
-            low = fmin(low, info->xyz[i * info->dim + axis]);
-            high = fmax(high, info->xyz[i * info->dim + axis]);
+            const double at = info->xyz[i * info->dim + axis];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
         }
         square += (high - low) * (high - low);
     }
