@@ -8,7 +8,7 @@
 /* Cells along each side of a cube, the vectors of which are more than most cores have for themselves. */
 enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40, DEGREE = 2 };
 
-#define ENOUGH_S 0.004
+#define ENOUGH_S 0.002
 /* What is assumed where there is no memory: a core of 2022. */
 #define ASSUMED_S 2.2e-9
 
