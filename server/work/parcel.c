@@ -1,5 +1,7 @@
 #include "work/parcel.h"
 
+#include "linalg/pieces.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,7 +63,9 @@ size_t parcel_write(char *to, const store_outcome *outcome)
             vector_head vh = {.count = a->vectors[k].count};
             memcpy(vh.name, a->vectors[k].name, sizeof vh.name);
             put(to, &at, &vh, sizeof vh);
-            put(to, &at, a->vectors[k].data, (size_t)vh.count * sizeof(double));
+            if (to && vh.count > 0) /* into pages that are new, as a rule, which threads share the price of */
+                uz_long_copy(vh.count, (double *)(void *)(to + at), a->vectors[k].data);
+            at += (size_t)vh.count * sizeof(double);
         }
         put(to, &at, a->history, (size_t)(ah.rows * ah.columns) * sizeof(double));
     }
