@@ -55,6 +55,7 @@ typedef struct {
     double base_slack; /* of base = K^-1 p, */
     double base_aim;   /* and what it was solved for; INFINITY: not at all, it is 0 */
     double held_slack; /* of known_u, while it is there */
+    bool unmeasured;   /* and while nobody has asked for it: its guess was seen to be wrong on the way */
     int refused;       /* guesses that were left to steps of the active set */
     bool asked;        /* for D r, before */
     bool near;         /* box->u and box->r are near the answer, and nobody has begun there yet */
@@ -186,8 +187,43 @@ static void probe(uz_dual_load *load, bool begin, double accuracy)
     memset(x->sparse.response, 0, (size_t)load->dual->d * sizeof *x->sparse.response);
 }
 
+/* Nobody bounds an answer by rows that pull: what it misses is left at INFINITY. */
+static bool may_bound(free_load *x, const double *r)
+{
+    bool pulls = false;
+    for (int64_t i = 0; i < x->sparse.load.dual->m; i++)
+        pulls = pulls || uz_reaction_pulls(r[i]);
+    x->sparse.slack = x->held_slack = INFINITY;
+    return !pulls;
+}
+
+/* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. */
+static uz_status measure_slack(free_load *x, const double *e, uz_error *err)
+{
+    const uz_dual *dual = x->sparse.load.dual;
+    const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.p, e, err);
+    x->sparse.slack = x->held_slack = uz_root(uz_long_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
+    return status;
+}
+
+/* The same of bounds: e is the forces on free dofs, and on held ones what no row bears. */
+static uz_status measure_held(free_load *x, uz_error *err)
+{
+    const uz_bounded *box = x->sparse.box;
+    const uz_bounds *bounds = box->bounds;
+    const int64_t m = x->sparse.load.dual->m;
+    double *e = x->cg.r;
+    x->unmeasured = false;
+    if (!may_bound(x, box->r))
+        return UZ_OK;
+    uz_long_copy(x->cg.n, e, box->force);
+    for (int64_t i = 0; i < m; i++)
+        e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
+    return measure_slack(x, e, err);
+}
+
 /* Without a solve: r is 0, or the answer of the last guess of the active rows, whose displacement is there. */
-static bool apply_known(free_load *x, double *Dr, const double *r)
+static bool apply_known(free_load *x, double *Dr, const double *r, uz_status *status, uz_error *err)
 {
     uz_dual_load *load = &x->sparse.load;
     const double *u = x->sparse.known_u;
@@ -199,6 +235,8 @@ static bool apply_known(free_load *x, double *Dr, const double *r)
     }
     if (!zero && !guessed)
         return false;
+    if (guessed && x->unmeasured)
+        *status = measure_held(x, err);
     for (int64_t j = 0; j < d; j++)
         x->sparse.response[j] = guessed ? u[j] - x->sparse.base[j] : 0.0;
     memset(Dr, 0, (size_t)m * sizeof *Dr);
@@ -217,7 +255,7 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
         begins = r[i] == 0.0;
     x->asked = true;
     uz_status status = isinf(x->base_aim) && !begins ? solve_base(x, BASE_ROUGH, err) : UZ_OK;
-    if (status != UZ_OK || apply_known(x, Dr, r))
+    if (status != UZ_OK || apply_known(x, Dr, r, &status, err))
         return status;
     const bool bounds = x->sparse.box != NULL;
     status = bounds ? UZ_OK : solve_base(x, BASE_FLOOR * x->aim, err);
@@ -428,25 +466,6 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 #define ACTIVE_FLOOR  0.5
 #define GUESSED_FLOOR 0.02
 
-/* Nobody bounds an answer by rows that pull: what it misses is left at INFINITY. */
-static bool may_bound(free_load *x, const double *r)
-{
-    bool pulls = false;
-    for (int64_t i = 0; i < x->sparse.load.dual->m; i++)
-        pulls = pulls || uz_reaction_pulls(r[i]);
-    x->sparse.slack = x->held_slack = INFINITY;
-    return !pulls;
-}
-
-/* What u misses of K u = p + N'r, in the norm of K^-1; e (d): force - N'r. */
-static uz_status measure_slack(free_load *x, const double *e, uz_error *err)
-{
-    const uz_dual *dual = x->sparse.load.dual;
-    const uz_status status = uz_multigrid_apply(x->cg.mg, x->sparse.load.K, x->cg.room, x->cg.p, e, err);
-    x->sparse.slack = x->held_slack = uz_root(uz_long_dot(dual->d, e, x->cg.p) / dual->amg->info.lambda);
-    return status;
-}
-
 /* A guess of the rows on its way to its answer. */
 typedef struct {
     free_load *x;
@@ -525,12 +544,12 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     uz_dual_load *load = &x->sparse.load;
     const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
-    const uz_bounds *bounds = box->bounds;
     const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim,
                  root = sqrt(load->dual->amg->info.lambda);
     stepwise on_way = {x, g, active, least};
     const bool at_once = cg->mg->kind->solve && x->coarse < AT_ONCE * least;
-    double tolerance = at_once ? least : fmax(least, x->coarse), *e = x->cg.r;
+    double tolerance = at_once ? least : fmax(least, x->coarse);
+    bool ended = false;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
     uz_sparse_multiply(load, cg->r, box->u);
     double square = uz_sum_by_pieces(leave_residual, x, d); /* u'K u */
@@ -555,7 +574,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
-        if (info.ended) /* and has told why: a row is wrong, by the force that the residual left */
+        ended = info.ended;
+        if (ended) /* and has told why: a row is wrong, by the force that the residual left */
             break;
         const bool roughly = tolerance > least && !stop.look;
         uz_bounded_balance(&x->sparse, roughly);
@@ -573,12 +593,10 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = status == UZ_OK ? freed : status;
     if (status != UZ_OK)
         return status;
-    if (may_bound(x, box->r)) { /* the forces on free dofs, and on held ones what no row bears */
-        uz_long_copy(d, e, box->force);
-        for (int64_t i = 0; i < m; i++)
-            e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
-        status = measure_slack(x, e, err);
-    }
+    x->unmeasured = ended; /* the next guess is as near, and is bounded in its place */
+    x->sparse.slack = x->held_slack = INFINITY;
+    if (!ended)
+        status = measure_held(x, err);
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
         load->psi0 =

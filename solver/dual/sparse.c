@@ -178,6 +178,8 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     const uz_dual *dual = x->load.dual;
     const uz_csc *Nt = &dual->Nt;
     double *c = x->load.correction, *Nc = x->work, complementarity = 0.0, scale = 0.0;
+    if (isinf(x->slack))
+        return UZ_OK;
     memset(c, 0, (size_t)dual->d * sizeof *c);
     for (int64_t i = 0; i < dual->m; i++)
         if (close[i] || uz_gap_penetrates(g[i]))

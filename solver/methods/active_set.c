@@ -181,6 +181,18 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
     return status;
 }
 
+/* Whoever goes on begins at what is bounded: where operators leave guesses unbounded that are seen to be wrong, it is
+ * the last one. */
+static uz_status bound_last(uz_iterate *it, const double *r, uz_dual_load *load, uz_error *err)
+{
+    if (!isinf(it->best_bound) || !it->law->kind->admissible(it->law, r, it->m))
+        return UZ_OK;
+    const uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
+    if (status != UZ_OK) /* also where there is no time for it */
+        return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+    return uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err);
+}
+
 /* Steps: the answer of the guess, and the next guess, until a wrong guess is not left or none can be solved. */
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                      uz_history *history, uz_error *err)
@@ -254,7 +266,9 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         memcpy(it->ray, p.r, (size_t)it->m * sizeof *it->ray);
     else if (may_exchange(it, load))
         status = solve_by_exchange(&p, end, it, load, options, history, err);
-done:;
+done:
+    if (status == UZ_OK && p.before > 0)
+        status = bound_last(it, p.r, load, err);
     void *room[] = {p.active, p.held, p.refuted, p.r, p.g};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
