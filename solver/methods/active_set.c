@@ -78,10 +78,25 @@ static uint64_t digest(const bool *active, int64_t m)
     return value;
 }
 
+static void flip(bool *active, const bool *refuted, int64_t m)
+{
+    for (int64_t i = 0; i < m; i++)
+        active[i] = active[i] != refuted[i];
+}
+
+static bool was_tried(const pivoting *p, uint64_t guess)
+{
+    bool tried = false;
+    for (int k = 0; k < p->n_tried; k++)
+        tried = tried || guess == p->tried[k];
+    return tried;
+}
+
 /* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better.
  * Where only single exchanges are left, the operator's guesses come first, and one exchange after each that was in
- * vain, as is the guess that has just been found wrong.
- */
+ * vain, as is the guess that has just been found wrong. Where a step takes a linear solve, so many single ones are
+ * never worth it while exchanges of all do not come back to a guess: on slender bodies the number of wrong rows goes up
+ * and down on the way. */
 static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 {
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
@@ -99,21 +114,21 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
     if (ask && uz_dual_load_guess_active(load, p->active)) {
         const uint64_t guessed = digest(p->active, m);
         if (guessed != p->tried[p->n_tried - 1]) {
-            for (int k = 0; k < p->n_tried; k++)
-                p->circles = p->circles || guessed == p->tried[k];
+            p->circles = was_tried(p, guessed);
             p->move = GUESS;
             return;
         }
         memcpy(p->active, p->held, (size_t)m * sizeof *p->held);
         p->rate[GUESS] = 1.0;
     }
-    for (int64_t i = m - 1; i >= 0; i--) {
-        if (!p->refuted[i])
-            continue;
-        p->active[i] = !p->active[i];
-        if (!all)
-            break;
-    }
+    flip(p->active, p->refuted, m);
+    if (all || (!load->dual->can->cheap_steps && !was_tried(p, digest(p->active, m))))
+        return;
+    flip(p->active, p->refuted, m);
+    int64_t last = m - 1;
+    while (last > 0 && !p->refuted[last])
+        last--;
+    p->active[last] = p->active[last] != p->refuted[last];
 }
 
 /* Only single exchanges are left. Each costs a factorization here, and a small part of one where factors are updated.

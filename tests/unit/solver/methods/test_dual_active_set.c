@@ -130,6 +130,35 @@ TEST(long_beams_take_few_steps)
     }
 }
 
+/* Without a factor each step is a linear solve: the number of wrong rows goes up and down for more steps than patience
+ * lasts, and one row at a time took 439 of them. */
+TEST(slender_solids_take_few_solves)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(350, 2, 350, 2)};
+    uz_scene *scene = &problem.scene;
+    uz_settings settings = uz_settings_default();
+    scene->model = UZ_SOLID;
+    scene->box.dim = 3;
+    scene->box.size[2] = 2;
+    scene->box.cells[2] = 2;
+    snprintf(scene->box.element, sizeof scene->box.element, "hex8");
+    scene->materials[0].young = 1000;
+    scene->materials[0].poisson = 0.3;
+    add_support(scene, "left", 0, 0);
+    scene->supports[0].u[2] = 0;
+    add_load(scene, "right", 0.01, 0.001);
+    add_load(scene, "top", 0, -0.0005);
+    add_plane(scene, "bottom", 0, -0.0001, 0, 1);
+    settings.op = UZ_OPERATOR_MATRIX_FREE;
+    uz_result *result = solve_problem(&problem, &settings);
+    if (result) {
+        CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s", result->summary.message);
+        CHECK_MSG(result->summary.iterations < 30, "%lld iterations", (long long)result->summary.iterations);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
 /* Nearly all rows touch: they come off one by one. Few do: they come to touch one by one. */
 TEST(steps_are_those_of_the_shorter_way)
 {
