@@ -74,34 +74,49 @@ bool uz_brick_init(uz_brick *brick)
 
 /* -------------------------------------------------------------- the diagonal */
 
+/* Where a node is along an axis. */
+enum { FIRST, BETWEEN, LAST, PLACES };
+
 /* Planes of nodes as the threads that share them see that. */
 typedef struct {
     uz_csc *to;
     const uz_brick *brick;
+    double sum[PLACES][PLACES][PLACES][3]; /* by z, y and x: what the cells around a node have for it */
     int parts;
 } diagonal;
 
-static void add_diagonals(void *ctx, int part)
+static int place_of(int64_t at, int64_t cells)
+{
+    return at == 0 ? FIRST : at < cells ? BETWEEN : LAST;
+}
+
+static void sum_diagonals(diagonal *x)
+{
+    for (int k = 0; k < PLACES; k++)
+        for (int j = 0; j < PLACES; j++)
+            for (int i = 0; i < PLACES; i++)
+                for (int a = 0; a < UZ_BRICK_NODES; a++) { /* the cell whose corner a is this node */
+                    const int *corner = uz_brick_corner[a], at[3] = {i, j, k};
+                    bool there = true;
+                    for (int c = 0; c < 3; c++)
+                        there = there && at[c] != (corner[c] ? FIRST : LAST);
+                    for (int c = 0; there && c < 3; c++)
+                        x->sum[k][j][i][c] += x->brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
+                }
+}
+
+static void fill_diagonals(void *ctx, int part)
 {
     const diagonal *x = ctx;
-    const uz_brick *brick = x->brick;
-    const int64_t *n = brick->cells, planes = n[2] + 1, first = planes * part / x->parts,
+    const int64_t *n = x->brick->cells, planes = n[2] + 1, first = planes * part / x->parts,
                   end = planes * (part + 1) / x->parts;
-    int64_t node = first * (n[0] + 1) * (n[1] + 1);
+    const int64_t *dof = x->brick->dof + 3 * first * (n[0] + 1) * (n[1] + 1);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++)
-            for (int64_t i = 0; i <= n[0]; i++, node++)
-                for (int a = 0; a < UZ_BRICK_NODES; a++) { /* the cell whose corner a is this node */
-                    const int *corner = uz_brick_corner[a];
-                    const int64_t at[3] = {i - corner[0], j - corner[1], k - corner[2]};
-                    if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= n[0] || at[1] >= n[1] || at[2] >= n[2])
-                        continue;
-                    for (int c = 0; c < 3; c++) {
-                        const int64_t dof = brick->dof[3 * node + c];
-                        if (dof >= 0)
-                            x->to->val[dof] += brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
-                    }
-                }
+            for (int64_t i = 0; i <= n[0]; i++, dof += 3)
+                for (int c = 0; c < 3; c++)
+                    if (dof[c] >= 0)
+                        x->to->val[dof[c]] = x->sum[place_of(k, n[2])][place_of(j, n[1])][place_of(i, n[0])][c];
 }
 
 uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
@@ -114,8 +129,10 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
         out->ptr[j + 1] = j + 1;
         out->idx[j] = (int32_t)j;
     }
-    diagonal x = {out, brick, brick->cells[2] < PARTS_MOST ? (int)brick->cells[2] + 1 : PARTS_MOST};
-    uz_aside_share(add_diagonals, &x, x.parts);
+    diagonal x = {
+        .to = out, .brick = brick, .parts = brick->cells[2] < PARTS_MOST ? (int)brick->cells[2] + 1 : PARTS_MOST};
+    sum_diagonals(&x);
+    uz_aside_share(fill_diagonals, &x, x.parts);
     return UZ_OK;
 }
 
