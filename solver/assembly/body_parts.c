@@ -181,11 +181,14 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
     }
     /* a held dof is a direction that supports hold; a spring holds its axes as stiffness */
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
+        const bool springs = model->spring && model->spring[i] > 0;
+        if (model->dof[i] >= 0 && !springs)
+            continue;
         const int64_t a = i / mesh->dim, c = i % mesh->dim;
         const double *Q = uz_node_frame(model, a);
         if (model->dof[i] < 0 && model->dof[i] != UZ_NO_DOF && !uz_is_rigid(model, a))
             uz_hold_part(parts, mesh, a, Q ? Q + c * mesh->dim : axis[c]);
-        if (model->spring && model->spring[i] > 0)
+        if (springs)
             uz_hold_part(parts, mesh, a, axis[c]);
     }
     hold_rigid(parts, model);

@@ -3,6 +3,7 @@
 #include "scene/box.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 
 #include <stdio.h>
@@ -30,25 +31,47 @@ int uz_box_places(int64_t place[UZ_ELEMENT_PARTS][UZ_ELEMENT_NODES][3], uz_eleme
     return linear->parts;
 }
 
+/* Layers of cells as the threads that share them see them. */
+typedef struct {
+    uz_mesh *mesh;
+    const uz_box *box;
+    uz_box_lattice lattice;
+    int64_t place[UZ_ELEMENT_PARTS][UZ_ELEMENT_NODES][3], layers;
+    int parts, count, shares; /* elements of a cell, nodes of an element */
+} filling;
+
+static void fill_layers(void *ctx, int share)
+{
+    const filling *f = ctx;
+    const int64_t *cells = f->box->cells, first = f->layers * share / f->shares,
+                  end = f->layers * (share + 1) / f->shares, of_layer = cells[0] * cells[1] * f->parts;
+    const int order = f->lattice.order;
+    int64_t *node = f->mesh->node + first * of_layer * f->count;
+    for (int64_t k = first; k < end; k++)
+        for (int64_t j = 0; j < cells[1]; j++)
+            for (int64_t i = 0; i < cells[0]; i++)
+                for (int p = 0; p < f->parts; p++)
+                    for (int a = 0; a < f->count; a++) {
+                        const int64_t *offset = f->place[p][a];
+                        const int64_t at[3] = {order * i + offset[0], order * j + offset[1], order * k + offset[2]};
+                        *node++ = uz_box_node(&f->lattice, at);
+                    }
+    for (int64_t e = first * of_layer; e < end * of_layer; e++)
+        f->mesh->first[e] = f->count * e;
+}
+
 void uz_box_fill_elements(uz_mesh *mesh, const uz_box *box)
 {
     const uz_element_kind kind = uz_box_element(box);
-    const uz_box_lattice lattice = uz_box_lattice_of(box);
-    const int64_t layers = box->dim == 3 ? box->cells[2] : 1;
-    const int count = uz_element_node_count(kind);
-    int64_t place[UZ_ELEMENT_PARTS][UZ_ELEMENT_NODES][3], *node = mesh->node;
-    const int parts = uz_box_places(place, kind), order = lattice.order;
-    for (int64_t k = 0; k < layers; k++)
-        for (int64_t j = 0; j < box->cells[1]; j++)
-            for (int64_t i = 0; i < box->cells[0]; i++)
-                for (int p = 0; p < parts; p++)
-                    for (int a = 0; a < count; a++) {
-                        const int64_t *offset = place[p][a];
-                        const int64_t at[3] = {order * i + offset[0], order * j + offset[1], order * k + offset[2]};
-                        *node++ = uz_box_node(&lattice, at);
-                    }
-    for (int64_t e = 0; e <= mesh->n_elements; e++)
-        mesh->first[e] = count * e;
+    filling f = {.mesh = mesh,
+                 .box = box,
+                 .lattice = uz_box_lattice_of(box),
+                 .layers = box->dim == 3 ? box->cells[2] : 1,
+                 .count = uz_element_node_count(kind)};
+    f.parts = uz_box_places(f.place, kind);
+    f.shares = f.layers < UZ_ASIDE_MOST ? (int)f.layers : UZ_ASIDE_MOST;
+    uz_aside_share(fill_layers, &f, f.shares);
+    mesh->first[mesh->n_elements] = f.count * mesh->n_elements;
     memset(mesh->kind, (int)kind, (size_t)mesh->n_elements);
 }
 
