@@ -833,8 +833,8 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 
 /* On equal cells: making the multigrid and bounding the spectrum, and a load that begins on coarser grids, in steps of
  * the smoother. Solid bodies of 100,000 to 810,000 dofs. */
-#define CELLS_CREATE  280.0
-#define CELLS_LOAD    235.0
+#define CELLS_CREATE  225.0
+#define CELLS_LOAD    170.0
 #define CELLS_GROWTH  0.06
 #define CELLS_FLOPS   40.0 /* for each dof, of what is as much as a step */
 #define CELLS_VECTORS 25.0
