@@ -383,7 +383,7 @@ static void scale(void *ctx, int64_t begin, int64_t end)
 }
 
 /* With w from conjugate gradients that begin at 0, s = e - K w: e'K^-1 e = w'(e + s) + s'K^-1 s. enough: of the value:
- * where half of it may be left to M, a cycle alone often tells. What is not small enough so is to be sharp. */
+ * a cycle alone, at w = 0, often tells. What is not small enough once that much is left to M is to be sharp. */
 static uz_status bound_inverse_norm(free_load *x, double *value, double *e, double enough, uz_error *err)
 {
     const uz_amg_info *known = &x->sparse.load.dual->amg->info;
@@ -406,7 +406,7 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
         stop.absolute = 0.5 * sqrt(UNSOLVED * enough * known->least);
         stop.relative = 0.25 * SHARP * sqrt(known->least);
     } else {
-        stop.absolute = sqrt(0.5 * known->lambda * enough);
+        stop.absolute = sqrt(known->lambda * enough);
     }
     uz_status status = uz_cg_solve(&info, w, &x->cg, x->sparse.load.K, e, &stop, err);
     double scaled = bound_by_cycle(x, e, w, info.last);
