@@ -5,8 +5,11 @@ import copy
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
+import socket
+import struct
 import subprocess
 import time
 
@@ -16,6 +19,7 @@ from service import MATRICES, PATIENT_S, SCENE, Skip, check, options, wait_until
 # As root, on fewer processors than processes, and in a container without process_vm_readv.
 os.environ.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                   OMPI_MCA_btl_vader_single_copy_mechanism="none")
+ROOT = pathlib.Path(__file__).parents[2]
 PAIR = "mpirun --oversubscribe -n 2 {program}"
 
 CUBE = {"problem": {"kind": "scene", "model": "solid",
@@ -233,6 +237,39 @@ def test_nothing_waits_awake(s):
     called = {line.split()[-1].split("@")[0] for line in listed.stdout.splitlines()}
     check("MPI_Testall" in called and "MPI_Isend" in called, called)
     check(not {f"MPI_{name}" for name in WAITING} & called, called)
+
+
+def hand_rows(s, told, messages):
+    """Status of a group of one process that is given rows of two nodes with a dof each (wire.h), as (blocks that the message
+    is said to have, those of each node, columns), and told of so many blocks in all; None: it makes levels of them."""
+    version = int(re.search(r"define UZ_WIRE_VERSION (\d+)", (ROOT / "solver/group/wire.h").read_text())[1])
+    ours, theirs = socket.socketpair()
+    with ours, theirs, subprocess.Popen([str(s.build / "uzawa-group"), str(theirs.fileno())], pass_fds=[theirs.fileno()],
+                                        stderr=subprocess.PIPE) as group:
+        theirs.close()
+        head = lambda kind, *numbers: struct.pack("=2i4q2d", kind, version, 1, *numbers)
+        ours.settimeout(PATIENT_S)
+        hello = ours.recv(56, socket.MSG_WAITALL)
+        ours.sendall(head(4, 2, 1, 1, 0.1, 0) + struct.pack("=2q", 2, told))  # BODY
+        for blocks, counts, columns in messages:  # ROWS
+            ours.sendall(head(5, len(counts), blocks, 0, 0, 0) + struct.pack(f"={blocks}d", *[1.0] * blocks) +
+                         struct.pack(f"={len(counts)}i", *counts) + struct.pack(f"={blocks}i", *columns) +
+                         struct.pack(f"={len(counts)}f", *[1.0] * len(counts)))
+        made = ours.recv(56, socket.MSG_WAITALL)
+        ours.close()
+        said = group.stderr.read()
+        check(len(hello) == 56 and (not made) == (b"other rows" in said), hello, made, said)
+        return None if made else group.wait(PATIENT_S)
+
+
+@needs_group
+@options("--workers", "1")
+def test_rows_that_are_not_those_told_of(s):
+    """Nothing is made of blocks that have not come, or of columns that there are not."""
+    check(hand_rows(s, 3, [(3, (2, 1), (0, 1, 1))]) is None)
+    for told, message in ((3, (2, (2, 1), (0, 1))),  # fewer than its nodes have
+                          (2, (2, (1, 1), (0, 7))), (2, (2, (1, 1), (1, 1)))):
+        check(hand_rows(s, told, [message]) not in (None, 0), told, message)
 
 
 @needs_group

@@ -319,6 +319,11 @@ static PetscErrorCode begin_body(group *g, const uz_wire_head *m)
     PetscCallMPI(MPI_Ibcast(of, 2 * g->size, MPI_INT64_T, 0, PETSC_COMM_WORLD, &request));
     wait_for(1, &request);
     PetscCall(PetscMalloc2(g->size, &b->count, g->size, &b->first));
+    int64_t nodes = 0;
+    for (PetscMPIInt k = 0; k < g->size; nodes += of[2 * k++])
+        PetscCheck(of[2 * k] >= 0 && of[2 * k] <= m->a && of[2 * k + 1] >= of[2 * k], PETSC_COMM_WORLD,
+                   PETSC_ERR_ARG_OUTOFRANGE, "%lld nodes of a process", (long long)of[2 * k]);
+    PetscCheck(nodes == m->a, PETSC_COMM_WORLD, PETSC_ERR_ARG_SIZ, "%lld nodes of processes", (long long)nodes);
     for (PetscMPIInt k = 0, at = 0; k < g->size; at += b->count[k++]) {
         b->first[k] = at;
         b->count[k] = (PetscMPIInt)of[2 * k] * b->bs;
@@ -356,6 +361,28 @@ static void free_rows(body *b)
     b->rows = (spread_rows){0};
 }
 
+/* first (size + 1): the first node of each process. Each own node has to have its diagonal block, and of others those
+ * that spread_rows says: levels are made of them without a further look. */
+static void check_rows(const group *g, const body *b, const int32_t *first)
+{
+    const int32_t begin = first[g->rank], end = first[g->rank + 1];
+    int64_t at = 0;
+    bool good = b->filled == b->here && b->filled_blocks == b->blocks;
+    for (PetscInt i = 0; good && i < b->here; i++) {
+        const int64_t stop = at + b->counts[i];
+        bool own = false;
+        good = b->counts[i] > 0 && stop <= b->blocks;
+        for (int32_t before = -1; good && at < stop; before = b->rows.column[at++]) {
+            const int32_t column = b->rows.column[at];
+            own = own || column == begin + i;
+            good = column > before && column < b->nodes && (column < begin || column >= begin + i || column >= end);
+        }
+        good = good && own;
+    }
+    if (!good || at != b->blocks)
+        end_group("other rows than were told of");
+}
+
 /* All rows have come. */
 static void make_system(group *g, body *b)
 {
@@ -365,10 +392,9 @@ static void make_system(group *g, body *b)
         first[k + 1] = first[k] + b->count[k] / b->bs;
     b->rows.first = first;
     b->rows.ptr = new_zeros(b->here + 1, sizeof *b->rows.ptr);
+    check_rows(g, b, first);
     for (PetscInt i = 0; i < b->here; i++)
         b->rows.ptr[i + 1] = b->rows.ptr[i] + b->counts[i];
-    if (b->rows.ptr[b->here] != b->blocks)
-        end_group("other rows than were told of");
     system_create(&b->system, &b->rows);
     b->made[VARIANT_WHOLE] = true;
     free(first);
