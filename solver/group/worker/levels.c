@@ -73,22 +73,23 @@ static void find_places(spread_system *s, const spread_rows *rows)
     for (int64_t i = 0; i < A->nodes; i++)
         A->ptr[i + 1] += A->ptr[i];
     A->idx = new_zeros(A->ptr[A->nodes], sizeof *A->idx);
-    A->off = new_zeros(A->ptr[A->nodes] * size + 4, sizeof *A->off);
+    A->off = new_room(A->ptr[A->nodes] * size + 4, sizeof *A->off); /* all but the last four are filled */
+    memset(A->off + A->ptr[A->nodes] * size, 0, 4 * sizeof *A->off);
     A->diag = new_zeros(A->nodes * size + 4, sizeof *A->diag);
 }
 
 /* Blocks as they come, times the scales of their rows and columns; a block stands in the row of its later node. */
-static void fill_level(spread_system *s, const spread_rows *rows, const double *scale_of_ghosts)
+UZ_INLINE void fill_blocks(spread_system *s, const spread_rows *rows, const double *scale_of_ghosts, int b)
 {
     uz_blocks *A = &s->level.A;
     const neighbours *near = &s->near;
-    const int b = s->b;
     const int64_t here = near->here, size = (int64_t)b * b;
     int64_t *next = new_zeros(A->nodes, sizeof *next);
     memcpy(next, A->ptr, (size_t)A->nodes * sizeof *next);
     for (int64_t i = 0; i < here; i++) {
         const int64_t width = (rows->ptr[i + 1] - rows->ptr[i]) * b;
-        for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++) {
+        const double *from = rows->value + rows->ptr[i] * size, *of_row = s->scale + i * b;
+        for (int64_t e = rows->ptr[i]; e < rows->ptr[i + 1]; e++, from += b) {
             const int64_t j = row_of(near, rows->first[near->rank], rows->column[e]);
             const double *of_column = j < here ? s->scale + j * b : scale_of_ghosts + (j - here) * b;
             double *to = A->diag + i * size;
@@ -98,11 +99,18 @@ static void fill_level(spread_system *s, const spread_rows *rows, const double *
             }
             for (int r = 0; r < b; r++)
                 for (int c = 0; c < b; c++)
-                    to[c * b + r] = s->scale[i * b + r] * of_column[c] *
-                                    rows->value[rows->ptr[i] * size + r * width + (e - rows->ptr[i]) * b + c];
+                    to[c * b + r] = of_row[r] * of_column[c] * from[r * width + c];
         }
     }
     free(next);
+}
+
+static void fill_level(spread_system *s, const spread_rows *rows, const double *scale_of_ghosts)
+{
+    if (s->b == 3)
+        fill_blocks(s, rows, scale_of_ghosts, 3);
+    else
+        fill_blocks(s, rows, scale_of_ghosts, s->b);
 }
 
 static void find_scale(spread_system *s, const spread_rows *rows)
@@ -152,6 +160,24 @@ static void add_sums(spread_system *s)
     free(place);
 }
 
+/* of_row, of_column: sums of D^-1/2 L D^-1/2, of absolute values; inverse: D^-1/2. */
+UZ_INLINE void add_sizes(double *of_row, double *of_column, const uz_blocks *A, int64_t nodes, const double *inverse,
+                         int b)
+{
+    const int64_t size = (int64_t)b * b;
+    for (int64_t i = 0; i < nodes; i++)
+        for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
+            const int64_t j = e < A->ptr[i] ? i : A->idx[e];
+            const double *block = e < A->ptr[i] ? A->diag + i * size : A->off + e * size;
+            for (int r = 0; r < b; r++)
+                for (int c = 0; c < (j == i ? r : b); c++) {
+                    const double scaled = fabs(block[r * b + c]) * inverse[i * b + r] * inverse[j * b + c];
+                    of_row[i * b + r] += scaled;
+                    of_column[j * b + c] += scaled;
+                }
+        }
+}
+
 /* The norm of D^-1/2 L D^-1/2 is at most the root of its largest row sum times its largest column sum. */
 static void bound_by_diagonal(spread_system *s)
 {
@@ -163,17 +189,10 @@ static void bound_by_diagonal(spread_system *s)
     double most[3] = {0.0, 0.0, 1.0}; /* of a row, of a column, of D'/D */
     for (int64_t i = 0; i < here * b; i++)
         inverse[i] = sqrt(1.0 / A->diag[i / b * size + i % b * b + i % b]); /* which is about 1 */
-    for (int64_t i = 0; i < here; i++)
-        for (int64_t e = A->ptr[i] - 1; e < A->ptr[i + 1]; e++) { /* the diagonal block first */
-            const int64_t j = e < A->ptr[i] ? i : A->idx[e];
-            const double *block = e < A->ptr[i] ? A->diag + i * size : A->off + e * size;
-            for (int r = 0; r < b; r++)
-                for (int c = 0; c < (j == i ? r : b); c++) {
-                    const double scaled = fabs(block[r * b + c]) * inverse[i * b + r] * inverse[j * b + c];
-                    row[i * b + r] += scaled;
-                    column[j * b + c] += scaled;
-                }
-        }
+    if (b == 3)
+        add_sizes(row, column, A, here, inverse, 3);
+    else
+        add_sizes(row, column, A, here, inverse, b);
     for (int64_t i = 0; i < here * b; i++) {
         const double own = A->diag[i / b * size + i % b * b + i % b];
         most[0] = fmax(most[0], row[i]);
