@@ -413,6 +413,26 @@ static uz_status solve(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_roo
 
 /* ---- making them */
 
+/* The group says how many processes it is of, once. */
+static bool meet(uz_process_group *group)
+{
+    uz_wire_head head;
+    if (group->processes == 0 && hear(group, &head, UZ_WIRE_HELLO)) {
+        group->lost = head.a < 1;
+        group->processes = head.a;
+    }
+    return !group->lost;
+}
+
+void uz_group_expect(uz_process_group *group, const uz_csc *K)
+{
+    pthread_mutex_lock(&group->mutex);
+    if (meet(group))
+        ask(group,
+            (uz_wire_head){.kind = UZ_WIRE_EXPECT, .a = K->ptr[K->cols] * (int64_t)sizeof *K->val / group->processes});
+    pthread_mutex_unlock(&group->mutex);
+}
+
 static bool hear_made(uz_process_group *group, uz_multigrid *info)
 {
     uz_wire_head head;
@@ -565,12 +585,8 @@ static uz_status begin_body(far_multigrid *body, double strong, uz_error *err)
 static uz_status send_body(far_multigrid *body, const uz_csc *K, const uz_modes *modes, uz_error *err)
 {
     uz_process_group *group = body->group;
-    uz_wire_head head;
-    if (group->processes == 0) {
-        if (!hear(group, &head, UZ_WIRE_HELLO) || head.a < 1)
-            return fail_lost(err);
-        group->processes = head.a;
-    }
+    if (!meet(group))
+        return fail_lost(err);
     uz_status status = divide_nodes(body, modes, err);
     if (status == UZ_OK)
         status = uz_spread_number(&body->map, group->processes, err);

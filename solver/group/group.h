@@ -8,6 +8,8 @@
 #include "amg/amg.h"
 #include "uzawa.h"
 
+/* Tells the group that K's rows will come, so that each process has room ready when they do. */
+void uz_group_expect(uz_process_group *group, const uz_csc *K);
 /* Returns when all of K was sent, while the group makes its levels; *out is to be awaited before anything else is done
  * with it or the group. Dofs that are held are those of the last one who held some: of one room at a time. Errors:
  * NOT_SPD where the diagonal shows it; UNSUPPORTED: too large; MEMORY; INTERNAL: the group was lost

@@ -1,9 +1,11 @@
 /* wire.h: what a process that solves (group.c) and the first process of a group (worker/main.c) say to each other.
  *
  * A stream in both directions, numbers as this machine writes them. Each message begins with a head; what follows it
- * stands below. The client asks, the group answers each question with one message; BODY, ROWS and FREE have no answer.
+ * stands below. The client asks, the group answers each question with one message; EXPECT, BODY,
+ * ROWS and FREE have no answer.
  *
  *     <- HELLO                       a: processes
+ *     -> EXPECT  a: bytes that the blocks' values in the rows of each process will take, about. No answer
  *     -> GRAPH   a: nodes n; n + 1 offsets and the neighbours of each node (int32)
  *     <- PARTS   a: processes; of each node the process that is to have it (n int32)
  *     -> BODY    a: nodes n, b: dofs of each, c: modes, x: uz_modes.strong; of each process its nodes and its blocks
@@ -33,6 +35,7 @@
 
 typedef enum {
     UZ_WIRE_HELLO = 1,
+    UZ_WIRE_EXPECT,
     UZ_WIRE_GRAPH,
     UZ_WIRE_PARTS,
     UZ_WIRE_BODY,
@@ -50,7 +53,7 @@ typedef enum {
 } uz_wire_kind;
 
 /* Both sides have to be of one build. */
-#define UZ_WIRE_VERSION 10
+#define UZ_WIRE_VERSION 11
 
 typedef struct {
     int32_t kind, version; /* uz_wire_kind, UZ_WIRE_VERSION */

@@ -148,17 +148,22 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
 /* A multigrid that a group of processes holds. */
-static uz_status spread(making *m, uz_modes *modes, uz_error *err)
+static uz_status spread(making *m, uz_error *err)
 {
     const double start = uz_seconds();
+    uz_modes modes = {0};
     char why[256] = "this program has no group of processes to solve with";
     const bool may = m->hooks && m->hooks->group;
     uz_process_group *group = may ? m->hooks->group(m->hooks->ctx, why, sizeof why) : NULL;
     uz_multigrid *mg = NULL;
     double rounding = 0.0;
-    uz_status status = group ? uz_group_multigrid(&mg, group, m->K, modes, err)
-                             : uz_fail(err, UZ_ERR_UNSUPPORTED, "operator", "operator distributed: %s", why);
-    uz_modes_clear(modes);
+    if (!group)
+        return uz_fail(err, UZ_ERR_UNSUPPORTED, "operator", "operator distributed: %s", why);
+    uz_group_expect(group, m->K);
+    uz_status status = find_modes(&modes, m->setup, m->K, err);
+    if (status == UZ_OK)
+        status = uz_group_multigrid(&mg, group, m->K, &modes, err);
+    uz_modes_clear(&modes);
     if (status == UZ_OK) {
         status = uz_amg_rounding(&rounding, m->K, err); /* while the group is at work */
         const uz_status awaited = uz_group_await(mg, status == UZ_OK ? err : NULL);
@@ -211,11 +216,11 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
         status = uz_brick_multigrid(&mg, setup->model.brick, (size_t)budget, err);
         if (status == UZ_OK)
             status = uz_amg_of(&setup->amg, mg, m->K, 0, m->hooks, err);
+    } else if (plan->form[plan->chosen].op == UZ_OPERATOR_DISTRIBUTED) {
+        status = spread(m, err);
     } else {
         status = find_modes(&modes, setup, m->K, err);
-        if (status == UZ_OK && plan->form[plan->chosen].op == UZ_OPERATOR_DISTRIBUTED)
-            status = spread(m, &modes, err);
-        else if (status == UZ_OK)
+        if (status == UZ_OK)
             status = aggregate(m, &modes, (size_t)budget, choice ? uz_cost_patience(plan, &m->size) : 0, err);
     }
     if (status == UZ_OK)

@@ -242,17 +242,18 @@ def test_nothing_waits_awake(s):
 def hand_rows(s, told, messages):
     """Status of a group of one process that is given rows of two nodes with a dof each (wire.h), as (blocks that the message
     is said to have, those of each node, columns), and told of so many blocks in all; None: it makes levels of them."""
-    version = int(re.search(r"define UZ_WIRE_VERSION (\d+)", (ROOT / "solver/group/wire.h").read_text())[1])
+    wire = (ROOT / "solver/group/wire.h").read_text()
+    version, kinds = int(re.search(r"define UZ_WIRE_VERSION (\d+)", wire)[1]), re.findall(r"^    UZ_WIRE_(\w+)", wire, re.M)
     ours, theirs = socket.socketpair()
     with ours, theirs, subprocess.Popen([str(s.build / "uzawa-group"), str(theirs.fileno())], pass_fds=[theirs.fileno()],
                                         stderr=subprocess.PIPE) as group:
         theirs.close()
-        head = lambda kind, *numbers: struct.pack("=2i4q2d", kind, version, 1, *numbers)
+        head = lambda kind, *numbers: struct.pack("=2i4q2d", 1 + kinds.index(kind), version, 1, *numbers)
         ours.settimeout(PATIENT_S)
         hello = ours.recv(56, socket.MSG_WAITALL)
-        ours.sendall(head(4, 2, 1, 1, 0.1, 0) + struct.pack("=2q", 2, told))  # BODY
-        for blocks, counts, columns in messages:  # ROWS
-            ours.sendall(head(5, len(counts), blocks, 0, 0, 0) + struct.pack(f"={blocks}d", *[1.0] * blocks) +
+        ours.sendall(head("BODY", 2, 1, 1, 0.1, 0) + struct.pack("=2q", 2, told))
+        for blocks, counts, columns in messages:
+            ours.sendall(head("ROWS", len(counts), blocks, 0, 0, 0) + struct.pack(f"={blocks}d", *[1.0] * blocks) +
                          struct.pack(f"={len(counts)}i", *counts) + struct.pack(f"={blocks}i", *columns) +
                          struct.pack(f"={len(counts)}f", *[1.0] * len(counts)))
         made = ours.recv(56, socket.MSG_WAITALL)

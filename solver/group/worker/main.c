@@ -16,6 +16,7 @@
 #include <string.h>
 
 enum { ROWS_PARTS = 4 }; /* of a message: values, counts, columns, modes */
+enum { EACH_TIMES = 2 }; /* the numbers of rows are copied once */
 
 /* A body, its rows by process. */
 typedef struct {
@@ -46,6 +47,7 @@ typedef struct {
     void *whole; /* what follows a head, or an answer; room of `room` bytes */
     size_t room;
     letter out[LETTERS]; /* taken in turn */
+    fresh_pages fresh;
     int next;
 } group;
 
@@ -419,6 +421,7 @@ static PetscErrorCode take_rows(group *g, const uz_wire_head *m)
     b->arrived += (PetscInt)m->a;
     if (b->arrived == b->nodes) {
         free_letters(g);
+        fresh_end(&g->fresh);
         make_system(g, b);
     }
     PetscFunctionReturn(0);
@@ -517,6 +520,10 @@ static PetscErrorCode obey(group *g, const uz_wire_head *m)
         PetscCall(answer_parts(g, m));
         PetscFunctionReturn(0);
     }
+    if (m->kind == UZ_WIRE_EXPECT) {
+        fresh_begin(&g->fresh, m->a > 0 && m->a < INT64_MAX / EACH_TIMES ? EACH_TIMES * m->a : 0);
+        PetscFunctionReturn(0);
+    }
     if (m->kind == UZ_WIRE_BODY) {
         PetscCall(begin_body(g, m));
         PetscFunctionReturn(0);
@@ -592,6 +599,7 @@ static PetscErrorCode serve(group *g)
     for (int k = 0; k < UZ_WIRE_BODIES; k++)
         if (g->body[k].id)
             PetscCall(free_body(&g->body[k]));
+    fresh_end(&g->fresh);
     free_letters(g);
     free(g->whole);
     PetscFunctionReturn(0);

@@ -10,6 +10,8 @@
 #include "amg/multigrid_private.h"
 
 #include <mpi.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -17,6 +19,16 @@
 void end_group(const char *why);
 void *new_room(int64_t count, size_t size); /* uninitialized */
 void *new_zeros(int64_t count, size_t size);
+/* Of one process alone: a thread that touches pages of room that will be taken soon. Zero at first. */
+typedef struct {
+    pthread_t thread;
+    bool runs;
+    atomic_bool over;
+    char *at;
+    size_t bytes;
+} fresh_pages;
+void fresh_begin(fresh_pages *fresh, int64_t bytes); /* as many as there will be, about; little is not worth it */
+void fresh_end(fresh_pages *fresh);                  /* no more of them */
 /* MPI_Waitall, asleep where it takes long. Nothing else waits: no call of MPI's that does is made. */
 void wait_for(int count, MPI_Request *requests);
 
