@@ -106,6 +106,13 @@ void uz_cg_turn(uz_cg *cg, double beta)
     uz_by_pieces(turn_direction, &u, cg->n);
 }
 
+static void add_direction(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    for (int64_t j = begin; j < end; j++)
+        u->x[j] += u->cg->p[j];
+}
+
 /* What x lacks is solved for where the residual is known: then less has to be told, and no product made. Else, as x at
  * held dofs counts as 0 there, its part goes to the right-hand side. */
 static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b,
@@ -115,10 +122,9 @@ static uz_status solve_elsewhere(uz_cg_info *info, double *x, uz_cg *cg, const u
     bool moved = false; /* not where all touches from the beginning */
     if (stop->begun) {
         memset(cg->p, 0, (size_t)cg->n * sizeof *cg->p);
-        memcpy(cg->z, cg->r, (size_t)cg->n * sizeof *cg->z);
+        uz_long_copy(cg->n, cg->z, cg->r);
         const uz_status status = kind->solve(cg->mg, K, cg->room, info, cg->p, cg->r, cg->z, 1, stop, err);
-        for (int64_t j = 0; j < cg->n; j++)
-            x[j] += cg->p[j];
+        uz_by_pieces(add_direction, &(update){.cg = cg, .x = x}, cg->n);
         return status;
     }
     for (int64_t j = 0; cg->held && j < cg->n; j++) {

@@ -8,6 +8,7 @@
 #include "group/spread.h"
 #include "group/wire.h"
 #include "linalg/linalg.h"
+#include "linalg/pieces.h"
 
 #include <errno.h>
 #include <math.h>
@@ -136,6 +137,20 @@ typedef struct {
     uz_multigrid_room *room;
 } far_system;
 
+/* Vectors of d numbers, for loops that threads share. */
+typedef struct {
+    const far_system *of;
+    double *to;
+    const double *from, *b;
+    const uz_csc *K;
+    bool zeros;
+} far_vectors;
+
+static bool is_held(const far_system *s, int64_t j)
+{
+    return s->room->held && s->room->held[j];
+}
+
 static far_system system_of(const uz_multigrid *mg, uz_multigrid_room *room)
 {
     return (far_system){(const far_multigrid *)mg, room};
@@ -188,25 +203,47 @@ static void multiply_share(void *ctx, int share)
     uz_csc_symv_columns(p->y[share], p->K, 1.0, p->x, begin, end);
 }
 
+static void add_half(void *ctx, int64_t begin, int64_t end)
+{
+    const product *p = ctx;
+    for (int64_t j = p->middle + begin; j < p->middle + end; j++)
+        p->y[0][j] += p->y[1][j];
+}
+
 static void multiply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *y, const double *x)
 {
     product p = {.K = K, .x = x, .y = {y, room->half}};
     while (p.middle < mg->n && K->ptr[p.middle] < K->ptr[mg->n] / 2)
         p.middle++;
     uz_aside_share(multiply_share, &p, 2);
-    for (int64_t j = p.middle; j < mg->n; j++)
-        y[j] += room->half[j];
+    uz_by_pieces(add_half, &p, mg->n - p.middle);
+}
+
+static void put_some(void *ctx, int64_t begin, int64_t end)
+{
+    const far_vectors *v = ctx;
+    const int64_t *dof = v->of->body->map.dof;
+    for (int64_t k = begin; k < end; k++)
+        v->to[k] = dof[k] < 0 || is_held(v->of, dof[k]) ? 0.0 : v->from[dof[k]];
 }
 
 /* x at dofs that are not held, and zeros. */
 static bool put_vector(const far_system *s, const double *x)
 {
     const far_multigrid *body = s->body;
-    memset(body->wide, 0, (size_t)body->map.size * sizeof *body->wide);
-    for (int64_t j = 0; j < body->map.d; j++)
-        if (!s->room->held || !s->room->held[j])
-            body->wide[body->map.place[j]] = x[j];
+    uz_by_pieces(put_some, &(far_vectors){.of = s, .to = body->wide, .from = x}, body->map.size);
     return put(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide);
+}
+
+static void take_some(void *ctx, int64_t begin, int64_t end)
+{
+    const far_vectors *v = ctx;
+    const int64_t *place = v->of->body->map.place;
+    for (int64_t j = begin; j < end; j++)
+        if (!is_held(v->of, j))
+            v->to[j] = v->from[place[j]];
+        else if (v->zeros)
+            v->to[j] = 0.0;
 }
 
 /* zeros: x is 0 at held dofs; else it stays there. */
@@ -215,11 +252,8 @@ static bool take_vector(const far_system *s, double *x, bool zeros)
     const far_multigrid *body = s->body;
     if (!take(body->group, body->wide, (size_t)body->map.size * sizeof *body->wide))
         return false;
-    for (int64_t j = 0; j < body->map.d; j++)
-        if (!s->room->held || !s->room->held[j])
-            x[j] = body->wide[body->map.place[j]];
-        else if (zeros)
-            x[j] = 0.0;
+    far_vectors v = {.of = s, .to = x, .from = body->wide, .zeros = zeros};
+    uz_by_pieces(take_some, &v, body->map.d);
     return true;
 }
 
@@ -261,7 +295,7 @@ static bool begin(const far_system *s, const double *x, const double *b, int cou
     const int64_t d = s->body->map.d;
     bool zero = true;
     for (int64_t j = 0; zero && j < count * d; j++)
-        zero = x[j] == 0.0 || (s->room->held && s->room->held[j % d]);
+        zero = x[j] == 0.0 || is_held(s, j % d);
     bool done = ask_of(s, (uz_wire_head){.kind = UZ_WIRE_BEGIN, .b = zero, .c = count});
     for (int k = 0; done && !zero && k < count; k++)
         done = put_vector(s, x + k * d);
@@ -335,19 +369,42 @@ static bool run_steps(const far_system *s, uz_cg_info *info, bool *flat, const u
     return true;
 }
 
-/* What r'M^-1 r can't be less than: M <= most diag(K). The square is the group's word, r is not, nor is what rounding
- * makes of r in x and b. */
-static bool is_possible(const far_system *s, const uz_csc *K, const double *r, const double *x, const double *b)
+/* to: r. */
+static double find_least(void *ctx, int64_t begin, int64_t end)
 {
+    const far_vectors *v = ctx;
+    const double *r = v->to, *x = v->from, *b = v->b;
     double least = 0.0, size = 0.0;
-    for (int64_t j = 0; j < s->body->map.d; j++) {
-        const double own = K->val[K->ptr[j]];
-        if (s->room->held && s->room->held[j])
+    for (int64_t j = begin; j < end; j++) {
+        const double own = v->K->val[v->K->ptr[j]];
+        if (is_held(v->of, j))
             continue;
         least += r[j] * r[j] / own;
         size += b[j] * b[j] / own + x[j] * x[j] * own;
     }
-    return s->room->square * s->room->most >= BELIEVED * least - ROUNDED * ROUNDED * size;
+    return BELIEVED * least - ROUNDED * ROUNDED * size;
+}
+
+/* What r'M^-1 r can't be less than: M <= most diag(K). The square is the group's word, r is not, nor is what rounding
+ * makes of r in x and b. */
+static bool is_possible(const far_system *s, const uz_csc *K, double *r, const double *x, const double *b)
+{
+    far_vectors v = {.of = s, .to = r, .from = x, .b = b, .K = K};
+    return s->room->square * s->room->most >= uz_sum_by_pieces(find_least, &v, s->body->map.d);
+}
+
+static void copy_free(void *ctx, int64_t begin, int64_t end)
+{
+    const far_vectors *v = ctx;
+    for (int64_t j = begin; j < end; j++)
+        v->to[j] = is_held(v->of, j) ? 0.0 : v->from[j];
+}
+
+static void leave_free(void *ctx, int64_t begin, int64_t end)
+{
+    const far_vectors *v = ctx;
+    for (int64_t j = begin; j < end; j++)
+        v->to[j] = is_held(v->of, j) ? 0.0 : v->b[j] - v->to[j];
 }
 
 /* r = b - K x on the dofs that are not held. */
@@ -355,11 +412,9 @@ static void find_residual(const far_system *s, const uz_csc *K, double *r, const
 {
     const int64_t d = s->body->map.d;
     double *free_part = s->body->wide; /* a vector in the group's order is not longer */
-    for (int64_t j = 0; j < d; j++)
-        free_part[j] = s->room->held && s->room->held[j] ? 0.0 : x[j];
+    uz_by_pieces(copy_free, &(far_vectors){.of = s, .to = free_part, .from = x}, d);
     multiply(&s->body->base, K, s->room, r, free_part);
-    for (int64_t j = 0; j < d; j++)
-        r[j] = s->room->held && s->room->held[j] ? 0.0 : b[j] - r[j];
+    uz_by_pieces(leave_free, &(far_vectors){.of = s, .to = r, .b = b}, d);
 }
 
 /* The group's part of it: false: it was lost. */
