@@ -145,11 +145,20 @@ static long double deform(point_at *x, double *measure, const uz_element *elemen
     x->ring = element->model == UZ_AXISYMMETRIC;
     *measure = uz_element_gradients(x->grad, element, local);
     *measure *= uz_element_around(x->around, element, x->grad, local);
-    for (int i = 0; i < 9; i++) {
-        long double sum = (i % 4 == 0) + (i == 8 ? element->across : 0);
-        for (int a = 0; a < x->nodes && i / 3 < dim && i % 3 < dim; a++)
-            sum += ((long double)u[dim * a + i / 3] - u[i / 3]) * x->grad[a][i % 3];
-        F[i] = sum;
+    memset(F, 0, sizeof x->F);
+    F[8] = 1 + element->across;
+    for (int i = 0; i < dim; i++) {
+        long double along = i == 0, across = i == 1, out = i == 2 ? F[8] : 0;
+        for (int a = 0; a < x->nodes; a++) {
+            const long double way = (long double)u[dim * a + i] - u[i];
+            along += way * x->grad[a][0];
+            across += way * x->grad[a][1];
+            if (dim == 3)
+                out += way * x->grad[a][2];
+        }
+        F[3 * i] = along;
+        F[3 * i + 1] = across;
+        F[3 * i + 2] = dim == 3 ? out : F[3 * i + 2];
     }
     for (int a = 0; a < x->nodes && x->ring; a++)
         F[8] += (long double)u[2 * a] * x->around[a];
@@ -254,10 +263,11 @@ static double det_at(const uz_element *element, const double *u, const uz_lame *
     return (double)det;
 }
 
-/* The least det F on the edge between two corners: of points between them, and from the least of these on where they
- * differ much. Both ends may be upright where it is not, as edges of quadratic elements bend. */
+/* The least det F on the edge between two corners, where it is first and last: of points between them, and from the
+ * least of these on where they differ much. Both ends may be upright where it is not, as edges of quadratic elements
+ * bend. */
 static double least_on_edge(const uz_element *element, const double *u, const uz_lame *lame, uz_elasticity law,
-                            const double from[3], const double to[3])
+                            const double from[3], const double to[3], double first, double last)
 {
     enum { PARTS = 4, HALVINGS = 6 };
     double least = INFINITY, most = -INFINITY, at = 0, way = 1.0 / PARTS;
@@ -270,7 +280,7 @@ static double least_on_edge(const uz_element *element, const double *u, const uz
         double point[3] = {0};
         for (int c = 0; c < uz_element_type_of(element->kind)->dim; c++)
             point[c] = from[c] + part * (to[c] - from[c]);
-        const double det = det_at(element, u, lame, law, point);
+        const double det = k == 0 ? first : k == PARTS ? last : det_at(element, u, lame, law, point);
         at = det < least ? part : at;
         least = fmin(least, det);
         most = fmax(most, det);
@@ -283,15 +293,18 @@ static double least_on_edges(const uz_element *element, const double *u, const u
 {
     const uz_element_type *type = uz_element_type_of(element->kind), *linear = uz_element_type_of(type->linear);
     const bool even = type->nodes == type->corners && (type->dim == 2 || type->jacobian == UZ_JACOBIAN_CONSTANT);
-    double least = INFINITY;
+    double least = INFINITY, det[UZ_ELEMENT_NODES];
     for (int a = 0; a < type->corners; a++) {
-        if (even)
-            least = fmin(least, det_at(element, u, lame, law, type->local[a]));
-        for (int k = 0; k < type->dim && !even; k++)
-            if (linear->next[a][k] > a)
-                least =
-                    fmin(least, least_on_edge(element, u, lame, law, type->local[a], type->local[linear->next[a][k]]));
+        det[a] = det_at(element, u, lame, law, type->local[a]);
+        least = fmin(least, det[a]);
     }
+    for (int a = 0; a < type->corners && !even; a++)
+        for (int k = 0; k < type->dim; k++) {
+            const int b = linear->next[a][k];
+            if (b > a)
+                least =
+                    fmin(least, least_on_edge(element, u, lame, law, type->local[a], type->local[b], det[a], det[b]));
+        }
     return least;
 }
 
