@@ -57,7 +57,7 @@ void uz_finite_body(uz_finite_measure *out, double *force, uz_body_model *tangen
         for (int i = 0; i < dim * count && step; i++)
             d[i] = step[dim * node[i / dim] + i % dim];
         uz_finite_warm(&element, xyz, u, free_strain ? free_strain[e] : 0);
-        uz_finite_element(&own, tangent ? ke : NULL, &rule, &element, uz_element_material(model, e)->law, u,
+        uz_finite_element(&own, tangent ? ke : NULL, force, &rule, &element, uz_element_material(model, e)->law, u,
                           step ? d : NULL);
         if (!(own.least_det >= out->least_det)) { /* not a number, too */
             out->least_det = own.least_det;

@@ -537,6 +537,7 @@ typedef struct {
     const uz_element *element;
     uz_elasticity law;
     const double *u, *step;
+    bool forces;
 } task;
 
 /* wide: nodes by fours. */
@@ -573,7 +574,8 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
         spread_mean(&laws, &mean, rule, H, &rest, across, x->ke, dim, ring);
     if (averaged && x->ke && x->step)
         mean_left(&theta, &pressure, &mean, rule, &rest, of_step, dim, ring);
-    find_forces(force, laws.S, rule, H, &rest, across, dim, wide, ring);
+    if (x->forces)
+        find_forces(force, laws.S, rule, H, &rest, across, dim, wide, ring);
     for (int g = 0; g < rule->gauss; g++)
         out->energy += rest.volume[g] * laws.W[g];
     for (int g = 0; g < rule->gauss && x->ke; g++) {
@@ -593,7 +595,7 @@ UZ_INLINE bool evaluate(const task *x, int dim, int wide, bool ring)
             T[i] -= mean.cross[i][g] * theta + mean.along[i][g] * pressure;
         moduli(at.A[g], F, D, x->step ? T : S, rest.volume[g], dim, ring);
     }
-    for (int a = 0; a < rule->nodes; a++)
+    for (int a = 0; a < rule->nodes && x->forces; a++)
         for (int i = 0; i < dim; i++)
             out->force[dim * a + i] = force[i][a / LANES][a % LANES];
     if (x->ke)
@@ -654,8 +656,8 @@ UZ_AVX2_FMA static bool twenty_of_solid(const task *x)
     return evaluate(x, 3, 5, false);
 }
 
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
-                       uz_elasticity law, const double *u, const double *step)
+bool uz_finite_element(uz_finite_forces *out, double *ke, bool forces, const uz_finite_rule *rule,
+                       const uz_element *element, uz_elasticity law, const double *u, const double *step)
 {
     typedef bool (*evaluation)(const task *);
     static const evaluation PLANE[] = {four_of_plane, eight_of_plane}, RING[] = {four_of_ring, eight_of_ring},
@@ -663,7 +665,7 @@ bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *
                                        twenty_of_solid};
     const int group = (rule->nodes - 1) / LANES;
     *out = (uz_finite_forces){.least_det = INFINITY};
-    const task x = {out, ke, rule, element, law, u, step};
+    const task x = {out, ke, rule, element, law, u, step, forces};
     if (!uz_cpu_has_avx2_fma())
         return any(&x);
     return (rule->dim == 3 ? SOLID : rule->model == UZ_AXISYMMETRIC ? RING : PLANE)[group](&x);

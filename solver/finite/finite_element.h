@@ -14,12 +14,12 @@ typedef struct {
 /* Of an element in the plane, of a ring or a solid, whose shape is good, displaced by u (nodes x dim).
  * Without incompatible modes. rule: uz_finite_rule_of its kind and model. ke (NULL: not
  * wanted): the tangent, the energy's second derivatives, full and symmetric, as uz_element_stiffness has it, which it
- * is at u = 0. False: det F <= 0 somewhere, or
+ * is at u = 0. forces: are they wanted? False: det F <= 0 somewhere, or
  * in plane stress no stretch across the plane is without stress; least_det alone is then filled. step  nodes x
  * dim, the last change of u: in ke alone, what the stress does to turning parts is that of the strains that this change
  * was linear for. NULL: none */
-bool uz_finite_element(uz_finite_forces *out, double *ke, const uz_finite_rule *rule, const uz_element *element,
-                       uz_elasticity law, const double *u, const double *step);
+bool uz_finite_element(uz_finite_forces *out, double *ke, bool forces, const uz_finite_rule *rule,
+                       const uz_element *element, uz_elasticity law, const double *u, const double *step);
 
 /* What expands freely by a part `free_strain` of its size in all directions is, without stress, so much larger: F of
  * the law is what is left of it, F / (1 + free_strain). The element and its u become those of that larger body at rest:

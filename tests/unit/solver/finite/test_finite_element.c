@@ -121,7 +121,7 @@ static bool evaluate(uz_finite_forces *out, double *ke, const uz_element *elemen
 {
     uz_finite_rule rule;
     uz_finite_rule_of(&rule, element->kind, element->model);
-    return uz_finite_element(out, ke, &rule, element, law, u, step);
+    return uz_finite_element(out, ke, true, &rule, element, law, u, step);
 }
 
 /* The n forces are derivatives of the energy, and ke those of the forces, within these. */
