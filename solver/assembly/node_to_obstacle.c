@@ -143,7 +143,7 @@ static double depth_at(double slope[2], const deepest *of, const double local[2]
     double N[UZ_FACE_NODES], grows[UZ_FACE_NODES][3], x[3], along[2][3], value;
     uz_gap gap;
     uz_side_gradients(N, grows, &of->side, local);
-    place_of(x, along, of, N, grows);
+    place_of(x, slope ? along : NULL, of, N, grows);
     if (uz_obstacle_gap(&gap, of->obstacle, x, NULL) != UZ_OK)
         return (double)NAN;
     value = gap.gap - of->back;
