@@ -6,9 +6,9 @@
 #include "core/vector3.h"
 #include "finite/point_load.h"
 #include "linalg/linalg.h"
+#include "scene/check.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,9 +68,7 @@ bool uz_has_followers(const uz_scene *scene)
 /* The sides that load i acts on; NULL: *err. */
 static const uz_group *sides_of(const uz_body_model *model, const uz_scene *scene, int64_t i, uz_error *err)
 {
-    char where[96];
-    snprintf(where, sizeof where, "/loads/%lld/on", (long long)i);
-    return uz_mesh_group(&model->mesh, scene->loads[i].on, where, err);
+    return uz_mesh_group(&model->mesh, scene->loads[i].on, UZ_PLACE("loads", i, "on"), err);
 }
 
 uz_status uz_follower_loads(double *f, const uz_body_model *model, const uz_scene *scene, const double *u,

@@ -182,56 +182,31 @@ static void turn_twice(double out[3], int k, int l, const double v[3])
         out[c] = 0.5 * ((c == l ? v[k] : 0) + (c == k ? v[l] : 0)) - (k == l ? v[c] : 0);
 }
 
-/* The Lagrangian's derivatives in R and m, by axes of rotation: those of w = (rotation, change of m). */
-static void second_derivatives(double Z[MOST_FUNCTIONALS][MOST_FUNCTIONALS], const point_at *x)
+/* Z: the inverse of the Lagrangian's second derivatives in R and m, by axes of rotation, which are (A, -B; -B, 0). */
+static void invert_second(double Z[MOST_FUNCTIONALS][MOST_FUNCTIONALS], const point_at *x)
 {
-    for (int k = 0; k < x->turns; k++)
-        for (int l = 0; l < x->turns; l++) {
-            double turned[3];
-            const int p = x->first + k, q = x->first + l;
-            turn_twice(turned, p, q, x->arm);
-            Z[k][l] = uz_dot3(x->load->v, turned);
-            for (int c = 0; c < 3; c++) { /* m . sum s (twice turned R r) x y, and sum s y (R r)' = S */
-                const int i = (c + 1) % 3, j = (c + 2) % 3;
-                double at_i[3], at_j[3];
-                turn_twice(at_i, p, q, x->S + 3 * j);
-                turn_twice(at_j, p, q, x->S + 3 * i);
-                Z[k][l] += x->m[c] * (at_i[i] - at_j[j]);
-            }
-            Z[k][x->turns + l] = Z[x->turns + l][k] = -x->B[3 * p + q];
-        }
-}
-
-/* A symmetric matrix of few rows by its inverse. False: it has none. */
-static bool invert_few(double A[MOST_FUNCTIONALS][MOST_FUNCTIONALS], int n)
-{
-    double I[MOST_FUNCTIONALS][MOST_FUNCTIONALS] = {{0}};
-    for (int k = 0; k < n; k++)
-        I[k][k] = 1;
-    for (int j = 0; j < n; j++) {
-        int pivot = j;
-        for (int i = j + 1; i < n; i++)
-            pivot = fabs(A[i][j]) > fabs(A[pivot][j]) ? i : pivot;
-        const double by = A[pivot][j];
-        if (by == 0)
-            return false;
-        for (int k = 0; k < n; k++) {
-            const double a = A[pivot][k] / by, b = I[pivot][k] / by;
-            A[pivot][k] = A[j][k];
-            I[pivot][k] = I[j][k];
-            A[j][k] = a;
-            I[j][k] = b;
-        }
-        for (int i = 0; i < n; i++) {
-            const double factor = A[i][j];
-            for (int k = 0; k < n && i != j; k++) {
-                A[i][k] -= factor * A[j][k];
-                I[i][k] -= factor * I[j][k];
-            }
+    double A[9] = {0};
+    for (int k = 0; k < x->turns * x->turns; k++) {
+        double turned[3];
+        const int p = x->first + k / x->turns, q = x->first + k % x->turns;
+        turn_twice(turned, p, q, x->arm);
+        A[3 * p + q] = uz_dot3(x->load->v, turned);
+        for (int c = 0; c < 3; c++) { /* m . sum s (twice turned R r) x y, and sum s y (R r)' = S */
+            const int i = (c + 1) % 3, j = (c + 2) % 3;
+            double at_i[3], at_j[3];
+            turn_twice(at_i, p, q, x->S + 3 * j);
+            turn_twice(at_j, p, q, x->S + 3 * i);
+            A[3 * p + q] += x->m[c] * (at_i[i] - at_j[j]);
         }
     }
-    memcpy(A, I, sizeof I);
-    return true;
+    for (int k = 0; k < x->turns; k++)
+        for (int l = 0; l < x->turns; l++) { /* 0, -1 / B; -1 / B, -1 / B A / B */
+            const double *row = x->inverse + 3 * (x->first + k), *column = x->inverse + x->first + l;
+            Z[k][l] = Z[x->turns + k][x->turns + l] = 0;
+            Z[k][x->turns + l] = Z[x->turns + l][k] = -row[x->first + l];
+            for (int i = 0; i < 9; i++)
+                Z[x->turns + k][x->turns + l] -= row[i / 3] * A[i] * column[i % 3 * 3];
+        }
 }
 
 /* Of dofs: the derivative in displacements of what Z is of. room: n_nodes x dim. */
@@ -253,7 +228,7 @@ static void find_functional(double *out, double *room, const point_at *x, int k)
 uz_status uz_point_tangent(uz_body_model *tangent, const uz_scene *scene, int64_t i, const double *u, uz_error *err)
 {
     const int64_t d = tangent->d, n = tangent->mesh.n_nodes * tangent->mesh.dim;
-    double Z[MOST_FUNCTIONALS][MOST_FUNCTIONALS] = {{0}};
+    double Z[MOST_FUNCTIONALS][MOST_FUNCTIONALS];
     uz_csc *K = &tangent->K;
     point_at x;
     uz_status status = find_point(&x, tangent, scene, i, u, err);
@@ -261,11 +236,8 @@ uz_status uz_point_tangent(uz_body_model *tangent, const uz_scene *scene, int64_
     double *C = uz_alloc(rank * d, sizeof *C), *room = uz_alloc(n, sizeof *room);
     if (status == UZ_OK && (!C || !room))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
-    if (status == UZ_OK) {
-        second_derivatives(Z, &x);
-        if (!invert_few(Z, rank))
-            status = uz_fail(err, UZ_ERR_SCENE, "/loads", "no rotation of \"%.63s\" can be told", x.load->on);
-    }
+    if (status == UZ_OK)
+        invert_second(Z, &x);
     for (int k = 0; k < rank && status == UZ_OK; k++)
         find_functional(C + k * d, room, &x, k);
     for (int64_t j = 0; j < d && status == UZ_OK; j++) {
