@@ -93,8 +93,7 @@ uz_status uz_distrust(double *norm, const uz_csc *K, uz_half_solve half, void *c
     }
     for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
         free(*of_d[k]);
-    free(w.X);
-    free(w.Y);
+    uz_free_all(w.X, w.Y);
     uz_csc_clear(&w.no_rows);
     return status;
 }

@@ -232,8 +232,7 @@ static uz_status try_part(bool *proven, double *exact, parts *x, int64_t i, uz_e
             for (int64_t c = 0; c < n; c++)
                 mpq_clear(x->value[c]);
         }
-        free(x->A);
-        free(x->value);
+        uz_free_all(x->A, x->value);
     }
     return status;
 }

@@ -167,7 +167,6 @@ uz_status uz_pair_gaps(double *least, double *part, const uz_body_model *model, 
                 look_from(least, part, c, -1 + 2.0 * q / steps, curves[!j], group[!j]->n_faces, &own);
         }
     uz_own_elements_clear(&own);
-    free(curves[0]);
-    free(curves[1]);
+    uz_free_all(curves[0], curves[1]);
     return status;
 }

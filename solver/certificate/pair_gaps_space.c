@@ -315,7 +315,6 @@ uz_status uz_pair_gaps_space(double *least, double *part, const uz_body_model *m
                     look_from(least, part, s, (double)k / steps, (double)l / steps, sheets[!j], group[!j]->n_faces,
                               own);
         }
-    free(sheets[0]);
-    free(sheets[1]);
+    uz_free_all(sheets[0], sheets[1]);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surfaces of a contact");
 }

@@ -88,7 +88,6 @@ uz_status uz_finite_tangent_of(uz_body_model *out, const uz_body_model *model, u
 
 void uz_finite_tangent_clear(uz_body_model *tangent)
 {
-    free(tangent->K.val);
-    free(tangent->K_fixed.val);
+    uz_free_all(tangent->K.val, tangent->K_fixed.val);
     memset(tangent, 0, sizeof *tangent);
 }

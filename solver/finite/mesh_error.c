@@ -232,8 +232,7 @@ uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_mod
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     *energy = x.failed ? (double)NAN : x.eta2;
     uz_nodal_strains_clear(&x.nodal);
-    free(x.moved);
-    free(place);
+    uz_free_all(x.moved, place);
     return status;
 }
 

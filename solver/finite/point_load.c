@@ -28,8 +28,7 @@ typedef struct {
 
 static void clear_point(point_at *x)
 {
-    free(x->share);
-    free(x->r);
+    uz_free_all(x->share, x->r);
 }
 
 static void multiply(double *out, const double *R, const double *v)
@@ -250,8 +249,7 @@ uz_status uz_point_tangent(uz_body_model *tangent, const uz_scene *scene, int64_
             for (int k = 0; k < rank; k++)
                 K->val[q] += C[k * d + K->idx[q]] * by[k];
     }
-    free(C);
-    free(room);
+    uz_free_all(C, room);
     clear_point(&x);
     return status;
 }

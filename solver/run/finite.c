@@ -277,19 +277,10 @@ static void end(uz_finite_run *run)
     uz_row_turn_clear(&run->turn);
     uz_cache_free(run->cache);
     uz_result_free(run->last);
-    free(run->scene.supports);
-    free(run->scene.loads);
-    free(run->outer.face);
-    free(run->free_strain);
-    free(run->loads);
-    free(run->prescribed);
-    free(run->overlap);
-    free(run->r);
+    uz_free_all(run->scene.supports, run->scene.loads, run->outer.face, run->free_strain, run->loads, run->prescribed,
+                run->overlap, run->r);
     uz_candidates_clear(&run->kept);
-    free(run->p);
-    free(run->v);
-    free(run->Kv);
-    free(run->step);
+    uz_free_all(run->p, run->v, run->Kv, run->step);
 }
 
 /* What is gone back to. */
@@ -447,8 +438,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
         if (part == UZ_PART_STOPPED)
             break;
     }
-    free(last.u);
-    free(last.r);
+    uz_free_all(last.u, last.r);
     return status;
 }
 
@@ -456,10 +446,7 @@ void uz_finite_point_free(uz_finite_point *point)
 {
     if (!point)
         return;
-    free(point->u);
-    free(point->r);
-    free(point->loads);
-    free(point);
+    uz_free_all(point->u, point->r, point->loads, point);
 }
 
 /* Where run->at is. */

@@ -187,6 +187,7 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err);
 uz_status uz_finite_solve(uz_result **out, uz_finite_run *run, const uz_qp *qp, double *r, int64_t n_r, uz_error *err);
 /* The contact problem of run->K, p and at.h: run->last, which is of all rows whatever run->kept becomes. */
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err);
+bool uz_finite_is_solved(const uz_result *problem);
 /* Those rows of a body that run->kept has (the caller clears N), and those of numbers of all rows. */
 uz_status uz_finite_reduce(uz_csc *N, const uz_finite_run *run, const uz_body_model *rows, uz_error *err);
 void uz_finite_gather(double *out, const uz_finite_run *run, const double *all);
@@ -229,6 +230,8 @@ uz_status uz_finite_may_pass(bool *may, const uz_finite_run *run, const double *
 uz_status uz_finite_widen(uz_finite_run *run, bool hold, uz_error *err);
 /* From the contact problem just solved to that on the whole tangent, which is not symmetric. */
 uz_status uz_finite_correct(uz_finite_run *run, uz_error *err);
+/* run->p += times what the skew part of loads that follow makes of v (d). nodal: room, 2 n. */
+void uz_finite_add_skew(uz_finite_run *run, double times, const double *v, double *nodal);
 /* Reactions of the rows `from` stay with their places among those of run->at, where places come and go as bodies slide.
  */
 uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *from, uz_error *err);

@@ -106,7 +106,6 @@ uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_f
         *norm = uz_finite_norm(run);
     }
     uz_dual_load_free(load);
-    free(gap);
-    free(pressing);
+    uz_free_all(gap, pressing);
     return status;
 }

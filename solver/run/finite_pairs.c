@@ -77,18 +77,16 @@ uz_status uz_finite_carry_reactions(uz_finite_run *run, const uz_body_model *fro
 
 /* ---- the step */
 
-/* What the skew part of loads that follow makes of v. nodal: 2 n. */
-static void add_followers(uz_finite_run *run, const double *v, double *nodal)
+void uz_finite_add_skew(uz_finite_run *run, double times, const double *v, double *nodal)
 {
     if (!run->skew.ptr)
         return;
     double *f = nodal + run->n;
     memset(f, 0, (size_t)run->n * sizeof *f);
     uz_recover_nodal(nodal, &run->at.turned, v, NULL);
-    uz_csc_gaxpy(f, &run->skew, 1, nodal);
+    uz_csc_gaxpy(f, &run->skew, times, nodal);
     uz_gather_nodal(nodal, &run->at.turned, f);
-    for (int64_t j = 0; j < run->d; j++)
-        run->p[j] += nodal[j];
+    uz_axpy(run->d, 1, nodal, run->p);
 }
 
 /* What the derivatives of rows along v add to what the matrix has of them; where they cannot be told those that the
@@ -145,7 +143,7 @@ static uz_status add_all(correction *x, const double *v, uz_error *err)
     if (run->at.rows.m > 0)
         memcpy(run->at.h, x->h, (size_t)run->at.rows.m * sizeof *run->at.h);
     const uz_status status = add_turn(run, v, err);
-    add_followers(run, v, x->nodal);
+    uz_finite_add_skew(run, 1, v, x->nodal);
     add_hold(run, run->p, run->at.h, x->h);
     return status;
 }
@@ -178,7 +176,7 @@ static uz_status follow(bool *solved, correction *x, double *y, const double *v,
 {
     uz_finite_run *run = x->run;
     memset(run->p, 0, (size_t)run->d * sizeof *run->p);
-    add_followers(run, v, x->nodal);
+    uz_finite_add_skew(run, 1, v, x->nodal);
     memcpy(x->dp, run->p, (size_t)run->d * sizeof *x->dp);
     for (int64_t i = 0; i < run->at.rows.m; i++)
         x->dh[i] = 0;
@@ -308,18 +306,13 @@ static uz_status settle_rows(bool *done, correction *x, uz_error *err)
     return UZ_OK;
 }
 
-static bool is_answered(const uz_result *last)
-{
-    return last->summary.outcome == UZ_CONVERGED || last->summary.outcome == UZ_PRECISION_LIMIT;
-}
-
 /* From the contact problem of x->p and x->h. */
 static uz_status iterate(correction *x, uz_error *err)
 {
     uz_finite_run *run = x->run;
     const int64_t d = run->d, m = run->at.rows.m;
     uz_status status = UZ_OK;
-    for (int k = 0; status == UZ_OK && is_answered(run->last); k++) {
+    for (int k = 0; status == UZ_OK && uz_finite_is_solved(run->last); k++) {
         double off = 0;
         for (int64_t j = 0; j < d; j++) {
             x->came[j] = run->last->u[j] - x->from[j];
@@ -374,7 +367,6 @@ uz_status uz_finite_correct(uz_finite_run *run, uz_error *err)
         status = iterate(&x, err);
     }
     uz_setup_release(run->cache, setup);
-    free(room);
-    free(marks);
+    uz_free_all(room, marks);
     return status;
 }

@@ -26,18 +26,14 @@ static void forget_rows(uz_finite_place *place)
 {
     uz_body_model_clear(&place->rows);
     uz_body_turned_clear(&place->turned);
-    free(place->h);
-    free(place->gap);
+    uz_free_all(place->h, place->gap);
     place->h = place->gap = NULL;
 }
 
 void uz_finite_place_clear(uz_finite_place *place)
 {
     forget_rows(place);
-    free(place->u);
-    free(place->force);
-    free(place->loads);
-    free(place->given);
+    uz_free_all(place->u, place->force, place->loads, place->given);
     memset(place, 0, sizeof *place);
 }
 

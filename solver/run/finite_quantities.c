@@ -35,11 +35,6 @@ typedef struct {
     double *t, *g;            /* m */
 } tangent;
 
-static bool is_solved(const uz_result *result)
-{
-    return result->summary.outcome == UZ_CONVERGED || result->summary.outcome == UZ_PRECISION_LIMIT;
-}
-
 /* w = K^-1 p. UZ_ERR_NOT_SPD and *solved false: K is not positive definite. */
 static uz_status solve_once(bool *solved, tangent *x, double *w, uz_error *err)
 {
@@ -48,7 +43,7 @@ static uz_status solve_once(bool *solved, tangent *x, double *w, uz_error *err)
     uz_result *result = NULL;
     uz_error own = {0};
     uz_status status = uz_finite_solve(&result, run, &linear, run->r, run->n_r, &own);
-    *solved = status == UZ_OK && is_solved(result);
+    *solved = status == UZ_OK && uz_finite_is_solved(result);
     if (*solved)
         memcpy(w, result->u, (size_t)run->d * sizeof *w);
     uz_result_free(result);
@@ -57,21 +52,6 @@ static uz_status solve_once(bool *solved, tangent *x, double *w, uz_error *err)
     if (status != UZ_OK && err)
         *err = own;
     return status;
-}
-
-/* p -= what the skew part of K, transposed, makes of w. */
-static void add_skew(tangent *x, const double *w)
-{
-    uz_finite_run *run = x->run;
-    double *f = x->nodal + run->n;
-    if (!run->skew.ptr)
-        return;
-    memset(f, 0, (size_t)run->n * sizeof *f);
-    uz_recover_nodal(x->nodal, &run->at.rows, w, NULL);
-    uz_csc_gaxpy(f, &run->skew, -1, x->nodal);
-    uz_gather_nodal(x->nodal, &run->at.rows, f);
-    for (int64_t j = 0; j < run->d; j++)
-        run->p[j] += x->nodal[j];
 }
 
 static uz_status solve(void *of, bool *solved, double *w, double *y, const bool *pressing,
@@ -92,8 +72,8 @@ static uz_status solve(void *of, bool *solved, double *w, double *y, const bool 
         for (int64_t i = 0; i < m; i++)
             x->t[i] = pressing[i] ? y[i] + x->hold * functional->gap[i] : 0;
         uz_csc_gaxpy_t(run->p, &rows->N, 1, x->t);
-        if (k > 0)
-            add_skew(x, x->last);
+        if (k > 0) /* transposed */
+            uz_finite_add_skew(run, -1, x->last, x->nodal);
         status = solve_once(&known, x, w, err);
         if (status != UZ_OK || !known)
             break;
@@ -224,11 +204,6 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
                                                         .prescribed = run->prescribed,
                                                         .stop = &stop},
                                     err);
-    free(displaced.mesh.xyz);
-    free(x.w);
-    free(x.last);
-    free(x.nodal);
-    free(x.t);
-    free(x.g);
+    uz_free_all(displaced.mesh.xyz, x.w, x.last, x.nodal, x.t, x.g);
     return status;
 }

@@ -127,6 +127,11 @@ static uz_status look_at_rest(bool *again, uz_finite_run *run, uz_error *err)
     return UZ_OK;
 }
 
+bool uz_finite_is_solved(const uz_result *problem)
+{
+    return problem->summary.outcome == UZ_CONVERGED || problem->summary.outcome == UZ_PRECISION_LIMIT;
+}
+
 uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
 {
     uz_status status = choose_rows(run, err);
@@ -140,8 +145,7 @@ uz_status uz_finite_solve_qp(uz_finite_run *run, uz_error *err)
         run->found.qps++;
         uz_result_free(run->last);
         run->last = next;
-        const uz_outcome outcome = next->summary.outcome;
-        again = !all && (outcome == UZ_CONVERGED || outcome == UZ_PRECISION_LIMIT);
+        again = !all && uz_finite_is_solved(next);
         if (again)
             status = look_at_rest(&again, run, err);
         again = again && status == UZ_OK;
