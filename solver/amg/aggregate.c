@@ -220,11 +220,7 @@ bool uz_part_aggregates(uz_blocks *parts, int32_t *aggregate, int64_t count, con
                 aggregate[i] = aggregate[i] >= 0 ? number[aggregate[i]] : aggregate[i];
         }
     }
-    free(part);
-    free(near);
-    free(next);
-    free(rest);
-    free(number);
+    uz_free_all(part, near, next, rest, number);
     return ok;
 }
 

@@ -15,10 +15,7 @@
 
 void uz_blocks_clear(uz_blocks *A)
 {
-    free(A->ptr);
-    free(A->idx);
-    free(A->off);
-    free(A->diag);
+    uz_free_all(A->ptr, A->idx, A->off, A->diag);
     memset(A, 0, sizeof *A);
 }
 
@@ -57,9 +54,7 @@ bool uz_below_init(uz_below *below, const uz_blocks *A)
 
 void uz_below_clear(uz_below *below)
 {
-    free(below->ptr);
-    free(below->node);
-    free(below->at);
+    uz_free_all(below->ptr, below->node, below->at);
     memset(below, 0, sizeof *below);
 }
 
@@ -136,9 +131,7 @@ static bool number_by_parts(uz_blocks *A, int32_t *node_of_group, const uz_csc *
     A->part[parts] = A->seam[0];
     A->seam[parts] = nodes;
     A->seams = A->parts > 0 && nodes / parts >= 3 * (int64_t)reach ? parts : 0;
-    free(part);
-    free(rest);
-    free(group);
+    uz_free_all(part, rest, group);
     return ok;
 }
 

@@ -36,9 +36,7 @@ void uz_cg_clear(uz_cg *cg)
 {
     if (cg->mg)
         cg->mg->kind->free_room(cg->room);
-    free(cg->r);
-    free(cg->z);
-    free(cg->p);
+    uz_free_all(cg->r, cg->z, cg->p);
     memset(cg, 0, sizeof *cg);
 }
 

@@ -589,9 +589,7 @@ static void free_room(uz_multigrid_room *room)
         return;
     uz_factor_workspace_free(room->ws);
     for (int l = 0; l < UZ_LEVELS_MOST; l++) {
-        free(room->t[l]);
-        free(room->x[l]);
-        free(room->b[l]);
+        uz_free_all(room->t[l], room->x[l], room->b[l]);
     }
     void *rest[] = {room->coarse, room->permuted, room->to, room->from, room->d};
     for (size_t k = 0; k < sizeof rest / sizeof rest[0]; k++)
@@ -683,9 +681,7 @@ static void free_aggregates(uz_multigrid *base)
             free(own[k]);
     }
     uz_factor_free(mg->coarsest);
-    free(mg->slot);
-    free(mg->scale);
-    free(mg);
+    uz_free_all(mg->slot, mg->scale, mg);
 }
 
 const uz_multigrid_kind uz_aggregates_kind = {.apply = apply,

@@ -363,9 +363,7 @@ static bool init_loss(uz_blocks *loss, const uz_level *level)
 void uz_release_levels(uz_multigrid_room *room)
 {
     for (int l = 0; l < room->levels; l++) {
-        free(room->own[l].off);
-        free(room->own[l].diag);
-        free(room->own[l].inverse);
+        uz_free_all(room->own[l].off, room->own[l].diag, room->own[l].inverse);
     }
     memset(room->own, 0, sizeof room->own);
     uz_factor_free(room->coarsest);

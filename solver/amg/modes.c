@@ -63,9 +63,7 @@ uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err)
         if (count != most)
             out->n_nodes = n;
     }
-    free(head);
-    free(place);
-    free(node);
+    uz_free_all(head, place, node);
     return status == UZ_ERR_MEMORY ? uz_fail(err, status, "K", "no memory for %lld dofs", (long long)n) : status;
 }
 

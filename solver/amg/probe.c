@@ -68,9 +68,7 @@ uz_status uz_amg_rounding(double *rounding, const uz_csc *K, uz_error *err)
         longest = count[j] > longest ? count[j] : longest;
     }
     *rounding = DBL_EPSILON * (double)(longest + 1) * most;
-    free(sum);
-    free(root);
-    free(count);
+    uz_free_all(sum, root, count);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)K->cols);
 }
 
@@ -218,9 +216,7 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_h
     }
     if (x.room)
         amg->mg->kind->free_room(x.room);
-    free(x.y);
-    free(x.b);
-    free(x.q);
+    uz_free_all(x.y, x.b, x.q);
     amg->info.spectrum_s += uz_seconds() - start;
     return status;
 }

@@ -90,9 +90,7 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
     const bool ok = x.room != NULL;
     if (ok)
         uz_aside_share(factor_part, &x, parts);
-    free(start);
-    free(node);
-    free(x.room);
+    uz_free_all(start, node, x.room);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
 }
 
@@ -300,9 +298,7 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_below *below, const floa
         memset(level->value + level->ptr[nodes] * level->A.b * k, 0, 8 * sizeof *level->value);
     }
     for (int part = 0; part < x.parts; part++) {
-        free(x.row[part].slot);
-        free(x.row[part].met);
-        free(x.row[part].block);
+        uz_free_all(x.row[part].slot, x.row[part].met, x.row[part].block);
     }
     if (atomic_load(&x.over))
         return uz_fail_stopped(err);

@@ -443,10 +443,7 @@ static void free_room(uz_multigrid_room *room)
     if (!room)
         return;
     for (int l = 0; l < room->levels; l++) {
-        free(room->v[l].x);
-        free(room->v[l].b);
-        free(room->v[l].t);
-        free(room->held[l]);
+        uz_free_all(room->v[l].x, room->v[l].b, room->v[l].t, room->held[l]);
     }
     free(room->held_coarsest);
     uz_brick_planes_clear(&room->planes);

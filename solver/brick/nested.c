@@ -74,10 +74,7 @@ static void clear(nested *x)
         for (int k = 0; k < 5; k++)
             free(all[k]);
     }
-    free(x->r);
-    free(x->direction);
-    free(x->q);
-    free(x->zero);
+    uz_free_all(x->r, x->direction, x->q, x->zero);
 }
 
 /* Load and bounds of a coarser grid: bounds are those of the node that stands there, or nearest to it. */

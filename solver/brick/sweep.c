@@ -56,9 +56,7 @@ void uz_brick_planes_clear(uz_brick_planes *room)
         struct uz_brick_room *of = &room->of[part];
         for (int k = 0; k < 2 * UZ_BRICK_DEGREE_MOST; k++)
             free(of->plane[k / 2][k % 2]);
-        free(of->sums);
-        free(of->line);
-        free(of->beside);
+        uz_free_all(of->sums, of->line, of->beside);
     }
     free(room->of_plane);
     memset(room, 0, sizeof *room);

@@ -40,10 +40,7 @@ bool uz_brick_axis_init(uz_brick_axis *axis, int64_t fine, int64_t coarse)
 
 void uz_brick_axis_clear(uz_brick_axis *axis)
 {
-    free(axis->below);
-    free(axis->beyond);
-    free(axis->first);
-    free(axis->share);
+    uz_free_all(axis->below, axis->beyond, axis->first, axis->share);
     memset(axis, 0, sizeof *axis);
 }
 

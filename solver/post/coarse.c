@@ -283,14 +283,7 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
             if (!(out->depth > 0))
                 add_lone_rows(out, &on, k);
         }
-        free(on.row_of);
-        free(on.sides);
-        free(on.touching);
-        free(on.active);
-        free(on.covered);
-        free(on.in_contact);
-        free(on.turn);
-        free(on.normals);
+        uz_free_all(on.row_of, on.sides, on.touching, on.active, on.covered, on.in_contact, on.turn, on.normals);
     }
     return room ? UZ_OK
                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of %lld contacts",

@@ -178,10 +178,7 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
                 w.end[2 * node] = w.end[2 * node + 1] = 0;
         }
     }
-    free(w.area);
-    free(w.force);
-    free(w.end);
-    free(w.has_row);
+    uz_free_all(w.area, w.force, w.end, w.has_row);
     return done ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)m);
 }
 

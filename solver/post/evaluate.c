@@ -18,14 +18,8 @@ void uz_evaluation_free(uz_evaluation *evaluation)
 {
     if (!evaluation)
         return;
-    free(evaluation->totals);
-    free(evaluation->contacts);
-    free(evaluation->supports);
-    free(evaluation->overlap);
-    free(evaluation->surfaces);
-    free(evaluation->quantities);
-    free(evaluation->share);
-    free(evaluation);
+    uz_free_all(evaluation->totals, evaluation->contacts, evaluation->supports, evaluation->overlap,
+                evaluation->surfaces, evaluation->quantities, evaluation->share, evaluation);
 }
 
 /* Room, names, and what does not depend on the answer. */

@@ -57,15 +57,8 @@ void uz_fields_clear(uz_fields *fields)
 {
     if (!fields)
         return;
-    free(fields->pressure);
-    free(fields->contact_status);
-    free(fields->stress);
-    free(fields->principal);
-    free(fields->von_mises);
-    free(fields->strain);
-    free(fields->gauss_element);
-    free(fields->gauss_point);
-    free(fields->gauss_stress);
+    uz_free_all(fields->pressure, fields->contact_status, fields->stress, fields->principal, fields->von_mises,
+                fields->strain, fields->gauss_element, fields->gauss_point, fields->gauss_stress);
     memset(fields, 0, sizeof *fields);
 }
 

@@ -197,9 +197,7 @@ static uz_status take_contacts(const making *k, uz_error *err)
     for (int64_t i = 0; i < model->mesh.n_nodes * k->dim && k->at; i++) /* the same force on a larger side */
         k->out->load[i] *= k->out->found / area;
     k->out->times = -1;
-    free(share);
-    free(whole);
-    free(force);
+    uz_free_all(share, whole, force);
     return status;
 }
 
@@ -343,9 +341,7 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
         uz_blend_rows(depth, model);
         uz_blend_rows(bulge, model);
     }
-    free(sum);
-    free(normal);
-    free(presses);
+    uz_free_all(sum, normal, presses);
     return status;
 }
 
@@ -553,8 +549,6 @@ uz_status uz_functional_make(uz_functional *out, const uz_quantity *quantity, co
 
 void uz_functional_clear(uz_functional *functional)
 {
-    free(functional->load);
-    free(functional->held);
-    free(functional->gap);
+    uz_free_all(functional->load, functional->held, functional->gap);
     memset(functional, 0, sizeof *functional);
 }

@@ -512,9 +512,6 @@ uz_status uz_find_interpenetration(uz_interpenetration *out, const uz_body_model
     uz_box_tree_clear(&w.now.sides);
     uz_box_tree_clear(&w.rest.elements);
     uz_box_tree_clear(&w.rest.sides);
-    free(seen);
-    free(w.part);
-    free(w.joins);
-    free(w.moved);
+    uz_free_all(seen, w.part, w.joins, w.moved);
     return status;
 }

@@ -262,12 +262,6 @@ uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *do
         else if (!recover_node(stress, strain, &done[a], &p, a))
             status = uz_no_memory(err, STRESS);
     }
-    free(middle);
-    free(p.of);
-    free(p.plain);
-    free(p.first);
-    free(p.around);
-    free(p.seen);
-    free(p.patch);
+    uz_free_all(middle, p.of, p.plain, p.first, p.around, p.seen, p.patch);
     return status;
 }

@@ -138,9 +138,6 @@ uz_status uz_path_compute(uz_path *out, const uz_scene *scene, const uz_field_so
 
 void uz_path_clear(uz_path *path)
 {
-    free(path->point);
-    free(path->u);
-    free(path->stress);
-    free(path->von_mises);
+    uz_free_all(path->point, path->u, path->stress, path->von_mises);
     *path = (uz_path){.point = NULL};
 }

@@ -124,9 +124,7 @@ uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz
             write_all(&w, answer, which);
             status = uz_vtu_finish(text, len, &w.vtu, err);
         }
-        free(w.room);
-        free(w.has_row);
-        free(w.pressure);
+        uz_free_all(w.room, w.has_row, w.pressure);
         uz_fields_clear(&fields);
     }
     uz_field_body_clear(&body);
