@@ -52,6 +52,7 @@ static struct {
     bool fired;
     long cut_at;          /* the event before which on_cut is called; 0: none */
     void (*on_cut)(void); /* under the lock */
+    void (*on_sync)(void);
 } faulty = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 typedef struct {
@@ -208,6 +209,8 @@ static inline int faulty_truncate(sqlite3_file *file, sqlite3_int64 size)
 static inline int faulty_sync(sqlite3_file *file, int flags)
 {
     (void)flags;
+    if (faulty.on_sync)
+        faulty.on_sync();
     pthread_mutex_lock(&faulty.lock);
     faulty_record *r = ((faulty_file *)(void *)file)->record;
     int rc = faulty_event() ? SQLITE_IOERR_FSYNC : SQLITE_OK;
@@ -373,7 +376,7 @@ static inline void faulty_reset(void)
     faulty.n_records = 0;
     faulty.events = faulty.fail_at = faulty.cut_at = 0;
     faulty.fail_for_ever = faulty.fired = faulty.tracks = false;
-    faulty.on_cut = NULL;
+    faulty.on_cut = faulty.on_sync = NULL;
     pthread_mutex_unlock(&faulty.lock);
 }
 

@@ -78,6 +78,8 @@ typedef enum {
                    after a crash undoes by itself: claims and leases */
 } write_durability;
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args);
+/* The first half of it, up to the commit, whose number sqlite_sync takes. frees: as WRITE_FREES. */
+store_status sqlite_change(uint64_t *number, sqlite_store *s, bool frees, store_change change, void *args);
 /* Carries out what waits in sqlite_store.changes. */
 void sqlite_run_batch(void *ctx, batch_change *first);
 /* Takes the spare room, if there is any to take. Before other threads, or under writer_lock. */

@@ -152,11 +152,16 @@ static store_status submit(sqlite_store *s, connection *c, void *args)
 store_status sqlite_submit(store *base, const store_request *request, job *out, bool *repeated)
 {
     submit_args a = {request, out, false};
-    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, submit, &a);
+    sqlite_store *s = sqlite_of(base);
+    uint64_t number;
+    store_status status = sqlite_change(&number, s, false, submit, &a);
     *repeated = a.repeated;
-    if (status == STORE_OK && !a.repeated)
+    if (status != STORE_OK)
+        return status;
+    sqlite_sync(s, number, false);
+    if (!a.repeated) /* a worker may begin while the disk turns: what it comes to is read once all is there */
         store_tell(base, out->id, true, NULL);
-    return status;
+    return sqlite_sync(s, number, true);
 }
 
 store_status sqlite_find_repeat(store *base, const store_request *request, job *out)

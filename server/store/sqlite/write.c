@@ -149,13 +149,21 @@ void sqlite_run_batch(void *ctx, batch_change *first)
     metrics_add(s->base.settings.metrics, METRIC_CHANGES, count);
 }
 
+store_status sqlite_change(uint64_t *number, sqlite_store *s, bool frees, store_change change, void *args)
+{
+    pending me = {.change = change, .args = args, .frees = frees};
+    batch_do(&s->changes, &me.base);
+    *number = me.number;
+    return me.status;
+}
+
 store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
-    pending me = {.change = change, .args = args, .frees = durability == WRITE_FREES};
-    batch_do(&s->changes, &me.base);
-    if (me.status != STORE_OK || durability == WRITE_LAZY)
-        return me.status;
-    return sqlite_sync(s, me.number, durability != WRITE_SOON);
+    uint64_t number;
+    const store_status status = sqlite_change(&number, s, durability == WRITE_FREES, change, args);
+    if (status != STORE_OK || durability == WRITE_LAZY)
+        return status;
+    return sqlite_sync(s, number, durability != WRITE_SOON);
 }
 
 /* There and back: a row that is given the value that it has is not written (SQLite, btreeOverwriteContent). */

@@ -7,6 +7,7 @@
 #include "store/engine_base.h"
 #include "store_place.h"
 
+#include <stdatomic.h>
 #include <sys/stat.h>
 
 static long scaled(long runs)
@@ -292,6 +293,38 @@ TEST(power_loss_takes_nothing_while_the_log_is_moved)
         remove_folder(power.folder);
     }
     CHECK(2 * cuts > scaled(16));
+}
+
+static atomic_bool is_told, was_told_first;
+
+static void note_told(void *ctx, const char *id, bool waits, const char *gone)
+{
+    (void)ctx, (void)id, (void)gone;
+    atomic_store(&is_told, waits);
+}
+
+static void wait_for_told(void)
+{
+    for (int ms = 0; ms < 3000 && !atomic_load(&is_told); ms++)
+        usleep(1000);
+    atomic_store(&was_told_first, atomic_load(&is_told));
+}
+
+/* Workers hear of a job while its submission gets on disk; who submits it does not until it is there. */
+TEST(workers_are_told_of_a_job_that_gets_on_disk)
+{
+    place p = {.s = NULL};
+    told t = {.count = 0};
+    faulty_install();
+    CHECK(place_begin(&p));
+    store_listen(p.s, note_told, NULL);
+    faulty.on_sync = wait_for_told;
+    CHECK_INT(step_submit(p.s, &t, 300), STORE_OK);
+    CHECK(atomic_load(&was_told_first));
+    faulty.on_sync = NULL;
+    store_listen(p.s, NULL, NULL);
+    place_end(&p);
+    faulty_reset();
 }
 
 /* The test itself: a store that acknowledges before the sync would be found out. */
