@@ -6,7 +6,7 @@
 #include "uzawa.h"
 
 /* Columns of a block, of which all have room from its first row to the last one that the envelope has in any. */
-enum { UZ_ENVELOPE_BLOCK = 48 };
+enum { UZ_ENVELOPE_BLOCK = 32 };
 
 typedef struct {
     int64_t n, blocks;
