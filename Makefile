@@ -206,6 +206,8 @@ UNROLLED := solver/amg/blocks.c solver/amg/cg.c solver/amg/cycle.c solver/amg/ga
 # where a multigrid has a copy for each size of its blocks.
 ROLLED = $(if $(SAN),$(addprefix $(BUILD)/obj/solver/,amg/blocks.o amg/cycle.o amg/galerkin.o element/% finite/% post/% assembly/stress_lanes.o))
 $(call obj,$(UNROLLED)): CFLAGS += $(if $(filter $(ROLLED),$@),,-O3)
+# Also those of lengths that only the run knows; without -O3, which contracts other products.
+$(call obj,solver/factor/refill.c): CFLAGS += -funroll-loops
 
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS) $(BUILD)/gen/openapi.json
 	@mkdir -p $(@D)
