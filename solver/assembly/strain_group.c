@@ -126,7 +126,7 @@ UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
     if (from->unrotated && from->model->kind != UZ_AXISYMMETRIC)
         take_unrotated(g, dim);
     if (from->large)
-        uz_lane_green_strains(g->strain, &g->rule, &g->shape, g->u);
+        uz_lane_green_strains(g->strain, &g->rule, &g->shape, g->u, from->by_volume);
     else if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
         uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
     else

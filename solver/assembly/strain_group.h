@@ -32,6 +32,7 @@ typedef struct {
                                 * nothing, and what it would leave by rounding grows with it. Not along the radius */
     bool unrotated;            /* and less the rotation that fits them best, for the same reason. Not of rings */
     bool large;                /* strains are those of Green and Lagrange, of elements without incompatible modes */
+    bool by_volume;            /* and these have ln J for their trace, see uz_lane_green_strains */
     int64_t begin, end;        /* of uz_strain_groups: the elements from begin to end - 1; end 0: all */
 } uz_strain_source;
 

@@ -253,23 +253,25 @@ UZ_INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, cons
 
 /* ---- for each kind of processor */
 
-/* det F becomes its mean over the volume at rest: C is multiplied by the n-th root of the square of what this is more.
- * Of det F - 1, as strains may be tiny. */
-UZ_INLINE void take_mean_determinant(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                     const uz_lane_shape *shape, uz_lanes H[][3][3], int dim)
+/* det F - 1 of the directions that dilatation is shared by, as strains may be tiny. */
+UZ_INLINE void dilatation(uz_lanes *more, uz_lanes h[3][3], int direct, int dim)
 {
-    uz_lanes sum = {0}, volume = {0}, own[UZ_ELEMENT_GAUSS];
-    for (int g = 0; g < rule->points; g++) {
-        uz_lanes(*h)[3] = H[g];
-        const uz_lanes minor = h[0][0] * h[1][1] - h[0][1] * h[1][0], across = h[2][2];
-        own[g] = h[0][0] + h[1][1] + minor;
-        if (rule->direct == 3)
-            own[g] += across + (h[0][0] + h[1][1] + minor) * across;
-        if (dim == 3)
-            own[g] += h[0][1] * h[1][2] * h[2][0] + h[0][2] * h[1][0] * h[2][1] - (1 + h[0][0]) * h[1][2] * h[2][1] -
-                      (1 + h[1][1]) * h[0][2] * h[2][0];
-        if (g < rule->averaged)
-            continue;
+    const uz_lanes plane = h[0][0] + h[1][1] + (h[0][0] * h[1][1] - h[0][1] * h[1][0]);
+    *more = plane;
+    if (direct == 3)
+        *more += h[2][2] + plane * h[2][2];
+    if (dim == 3)
+        *more += h[0][1] * h[1][2] * h[2][0] + h[0][2] * h[1][0] * h[2][1] - (1 + h[0][0]) * h[1][2] * h[2][1] -
+                 (1 + h[1][1]) * h[0][2] * h[2][0];
+}
+
+/* det F becomes its mean over the volume at rest: C is multiplied by the n-th root of the square of what this is more.
+ * own: det F - 1 of points, and becomes that. */
+UZ_INLINE void take_mean_determinant(uz_lanes strain[][UZ_ELEMENT_STRESSES], uz_lanes *own, const uz_strain_rule *rule,
+                                     const uz_lane_shape *shape)
+{
+    uz_lanes sum = {0}, volume = {0};
+    for (int g = rule->averaged; g < rule->points; g++) {
         sum += shape->volume[g] * own[g];
         volume += shape->volume[g];
     }
@@ -280,19 +282,37 @@ UZ_INLINE void take_mean_determinant(uz_lanes strain[][UZ_ELEMENT_STRESSES], con
             more[l] = expm1(2.0 / rule->direct * (log1p(sum[l]) - log1p(own[g][l])));
         for (int c = 0; c < rule->stresses; c++)
             strain[g][c] += more * (strain[g][c] + (c < rule->direct ? 0.5 : 0));
+        own[g] = sum;
+    }
+}
+
+/* The trace becomes the logarithm of det F. */
+UZ_INLINE void take_volume(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_lanes *own, const uz_strain_rule *rule)
+{
+    for (int g = 0; g < rule->points; g++) {
+        uz_lanes more = {0};
+        for (int l = 0; l < UZ_STRAIN_LANES; l++)
+            more[l] = log1p(own[g][l]);
+        for (int c = 0; c < rule->direct; c++)
+            more -= strain[g][c];
+        for (int c = 0; c < rule->direct; c++)
+            strain[g][c] += more / rule->direct;
     }
 }
 
 /* (H'H)_ij of the components' axes i and j, half of it where these are one: of rings H[2][2] is that around. */
 UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                const uz_lane_shape *shape, const uz_lanes *u, int dim)
+                                const uz_lane_shape *shape, const uz_lanes *u, bool by_volume, int dim)
 {
     static const int PLANE[][2] = {{0, 0}, {1, 1}, {0, 1}}, RING[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}},
                      SPACE[][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
     const int(*axes)[2] = dim == 3 ? SPACE : rule->stresses == 4 ? RING : PLANE;
-    uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+    const bool averaged = rule->formulation == UZ_FORMULATION_BBAR;
+    uz_lanes H[UZ_ELEMENT_GAUSS][3][3], own[UZ_ELEMENT_GAUSS];
     gradients_of(H, rule, shape, u, dim);
     for (int g = 0; g < rule->points; g++) {
+        if (averaged || by_volume)
+            dilatation(&own[g], H[g], rule->direct, dim);
         strain_of_gradient(strain[g], H[g], rule, shape, u, g, dim);
         for (int c = 0; c < rule->stresses; c++) {
             const int i = axes[c][0], j = axes[c][1];
@@ -302,8 +322,10 @@ UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz
             strain[g][c] += (i == j ? 0.5 : 1.0) * square;
         }
     }
-    if (rule->formulation == UZ_FORMULATION_BBAR)
-        take_mean_determinant(strain, rule, shape, H, dim);
+    if (averaged)
+        take_mean_determinant(strain, own, rule, shape);
+    if (by_volume)
+        take_volume(strain, own, rule);
 }
 
 UZ_INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
@@ -333,12 +355,12 @@ UZ_INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule
 }
 
 UZ_INLINE void green_strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                      const uz_lane_shape *shape, const uz_lanes *u)
+                                      const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
 {
     if (rule->dim == 2)
-        green_strains_of(strain, rule, shape, u, 2);
+        green_strains_of(strain, rule, shape, u, by_volume, 2);
     else
-        green_strains_of(strain, rule, shape, u, 3);
+        green_strains_of(strain, rule, shape, u, by_volume, 3);
 }
 
 UZ_AVX2_FMA static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x,
@@ -360,9 +382,9 @@ UZ_AVX2_FMA static void gradients_fused(uz_lanes H[][3][3], const uz_strain_rule
 }
 
 UZ_AVX2_FMA static void green_strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                            const uz_lane_shape *shape, const uz_lanes *u)
+                                            const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
 {
-    green_strains_in_space(strain, rule, shape, u);
+    green_strains_in_space(strain, rule, shape, u, by_volume);
 }
 
 void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
@@ -377,9 +399,9 @@ void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], con
 }
 
 void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                           const uz_lane_shape *shape, const uz_lanes *u)
+                           const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
 {
-    (uz_cpu_has_avx2_fma() ? green_strains_fused : green_strains_in_space)(strain, rule, shape, u);
+    (uz_cpu_has_avx2_fma() ? green_strains_fused : green_strains_in_space)(strain, rule, shape, u, by_volume);
 }
 
 void uz_lane_gradients(uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,

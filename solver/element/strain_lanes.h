@@ -51,9 +51,11 @@ void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], con
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
 
 /* Those of Green and Lagrange, (H + H' + H'H) / 2 with shears 2 E_xy, for large deformation: without incompatible
- * modes; of mean dilatation those of F whose determinant is its mean (finite/mean_dilatation.h). */
+ * modes; of mean dilatation those of F whose determinant is its mean (finite/mean_dilatation.h). by_volume: with ln J,
+ * J the determinant of the directions that have strains, in place of their trace, so that means of them are of one J
+ * where that is one. */
 void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                           const uz_lane_shape *shape, const uz_lanes *u);
+                           const uz_lane_shape *shape, const uz_lanes *u, bool by_volume);
 
 /* H[point][c][j]: derivative of u_c by x_j of the displacements u alone, without modes and means; of rings [2][2] is
  * the strain around, in the plane [2] and [.][2] are 0. */

@@ -5,7 +5,11 @@
  *     eta^2 = integral of (E* - E_h)' D (E* - E_h) over the volume at rest
  * estimates the square of the error in the energy norm of the tangent, but for what the stress does to turning parts,
  * and 2 W stands for the square of the norm of u, which it is of small strain. Of quantities it is the inner product of
- * that with the same of another displacement z, in the derivative of E along it. */
+ * that with the same of another displacement z, in the derivative of E along it.
+ * Means of E that each keep the volume do not: they are off by the square of how E differs, and where the law is nearly
+ * incompressible that would be all that is told. So where there is mean dilatation, whose J is known, what is averaged
+ * has ln J for its trace, and of E* - E_h the part along C is what makes the change of ln J that of the means.
+ */
 #include "finite/mesh_error.h"
 
 #include "assembly/nodal_strains.h"
@@ -40,7 +44,8 @@ typedef struct {
     double own, step, *eta2_of; /* step: of z in to[0]; eta2_of: n_elements; NULL: not wanted */
     const uz_strain_source *to;
     uz_strain_group *moved;
-    bool whole; /* with what is hidden */
+    bool whole;     /* with what is hidden */
+    bool by_volume; /* means are of strains with ln J for their trace */
 } comparison;
 
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
@@ -72,30 +77,69 @@ static double energy_across(const uz_element *element, uz_elasticity law, double
     return W;
 }
 
+/* What the trace of a strain is less than ln J (uz_lane_green_strains), by its n components with shears 2 E_xy. */
+static double volume_beside(const double *E, int n, int direct)
+{
+    const double *shear = E + direct, plane = 2 * E[0] + 2 * E[1] + 4 * E[0] * E[1] - shear[0] * shear[0];
+    double more = plane, trace = E[0] + E[1];
+    if (direct == 3) {
+        more += 2 * E[2] * (1 + plane);
+        trace += E[2];
+    }
+    if (n == N_STRAINS)
+        more += 2 * shear[0] * shear[1] * shear[2] - (1 + 2 * E[0]) * shear[1] * shear[1] -
+                (1 + 2 * E[1]) * shear[2] * shear[2];
+    return 0.5 * log1p(more) - trace;
+}
+
+/* A difference whose trace is one of ln J becomes one of strains, at C. */
+static void strain_of_volume(double *off, const double C[N_STRAINS], const int *at, double per_square, int n,
+                             int direct)
+{
+    const double by[N_STRAINS] = {C[1] * C[2] - C[4] * C[4], C[0] * C[2] - C[5] * C[5], C[0] * C[1] - C[3] * C[3],
+                                  C[4] * C[5] - C[3] * C[2], C[3] * C[5] - C[0] * C[4], C[3] * C[4] - C[1] * C[5]};
+    const double det = C[0] * by[0] + C[3] * by[3] + C[5] * by[5];
+    double trace = 0, along = 0, sum = 0;
+    for (int c = 0; c < direct; c++)
+        trace += off[c];
+    for (int c = 0; c < n; c++) {
+        off[c] = per_square * (off[c] - (c < direct ? trace / direct : 0));
+        along += by[at[c]] / det * off[c];
+        sum += c < direct ? by[at[c]] / det : 0;
+    }
+    for (int c = 0; c < direct; c++)
+        off[c] += (trace - along) / sum;
+}
+
 /* At point p of the element in a lane: W, and the difference's energy in the moduli there. Where these are not positive
  * a difference may have none. Per volume of the body at rest. */
 static bool compare_at(double *W, double *eta2, const comparison *x, const uz_strain_group *group, const int64_t *place,
                        const uz_element *element, double across, int p, int lane)
 {
     static const int PLANE[] = {0, 1, 3}, SPACE[] = {0, 1, 2, 3, 4, 5}; /* components of the rows' */
-    const int n = group->rule.stresses, *at = n == 3 ? PLANE : SPACE;
+    const int n = group->rule.stresses, direct = group->rule.direct, *at = n == 3 ? PLANE : SPACE;
     const double warm = group->free_strain[lane], size = 1 + warm, per_square = 1 / (size * size);
     double mean = 0; /* expansion, at the nodes */
     for (int a = 0; a < group->rule.nodes && x->nodal.size > n + 1; a++)
         mean += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + n + 1];
+    const double freely = x->by_volume ? log1p(mean) - log1p(warm) : thermal(mean) - thermal(warm);
     double C[N_STRAINS] = {1, 1, n == 3 ? per_square : 1}, strain[N_STRAINS], S[N_STRAINS], D[N_STRAINS][N_STRAINS],
-           off[N_STRAINS], sum = 0, work = 0, most = 0;
+           E[N_STRAINS] = {0}, off[N_STRAINS], sum = 0, work = 0, most = 0;
+    for (int c = 0; c < n; c++)
+        E[c] = group->strain[p][c][lane];
+    const double beside = x->by_volume ? volume_beside(E, n, direct) / direct : 0;
     for (int c = 0; c < n; c++) {
-        const double E = group->strain[p][c][lane] - (at[c] < 3 ? thermal(warm) : 0);
-        off[c] = -x->own * (E + (at[c] < 3 ? thermal(mean) : 0));
+        off[c] = -x->own * (E[c] + (c < direct ? beside + freely : 0));
         if (x->to)
             off[c] -= (x->moved[0].strain[p][c][lane] - x->moved[1].strain[p][c][lane]) / (2 * x->step);
         for (int a = 0; a < group->rule.nodes; a++)
             off[c] += group->rule.N[p][a] * x->nodal.rows[place[a] * x->nodal.size + c];
-        off[c] *= per_square;
-        strain[c] = per_square * E;
-        C[at[c]] += (at[c] < 3 ? 2 : 1) * strain[c]; /* shears are 2 E_xy, and C_xy is */
+        strain[c] = per_square * (E[c] - (c < direct ? thermal(warm) : 0));
+        C[at[c]] += (c < direct ? 2 : 1) * strain[c]; /* shears are 2 E_xy, and C_xy is */
+        off[c] *= x->by_volume ? 1 : per_square;
     }
+    if (x->by_volume)
+        strain_of_volume(off, C, at, per_square, n, direct);
     const uz_elasticity law = uz_element_material(x->model, group->element[lane])->law;
     if (!uz_finite_law(W, S, D, C, element, law))
         return false;
@@ -147,15 +191,25 @@ static void compare(void *ctx, const uz_strain_group *group)
     }
 }
 
+static bool has_mean_dilatation(const uz_body_model *model)
+{
+    bool found = false;
+    for (int64_t e = 0; e < model->mesh.n_elements && !found; e++)
+        found = uz_element_formulation(model, e) == UZ_FORMULATION_BBAR;
+    return found;
+}
+
 uz_status uz_finite_mesh_error(double *error, double *eta2, const uz_body_model *model, const uz_scene *scene,
                                const double *free_strain, const double *u, uz_error *err)
 {
-    comparison x = {.model = model, .own = 1, .whole = true, .eta2_of = eta2};
+    comparison x = {.model = model, .own = 1, .whole = true, .eta2_of = eta2, .by_volume = has_mean_dilatation(model)};
     const uz_strain_source from = {
         .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
+    uz_strain_source means = from;
+    means.by_volume = x.by_volume;
     if (eta2)
         memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
-    uz_status status = uz_nodal_strains_recover(&x.nodal, &from, UZ_CONTINUE_LINEAR, NULL, err);
+    uz_status status = uz_nodal_strains_recover(&x.nodal, &means, UZ_CONTINUE_LINEAR, NULL, err);
     if (status == UZ_OK)
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     uz_nodal_strains_clear(&x.nodal);
@@ -191,14 +245,12 @@ static uz_status recover_along(comparison *x, const uz_strain_source *from, uz_e
 }
 
 /* What part of times z is gone for a derivative. */
-static double step_along(const uz_body_model *model, const double *z, double times)
+static double step_along(const comparison *x, const double *z, double times)
 {
+    const uz_body_model *model = x->model;
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
-    bool averaged = false;
     double most = 0;
-    for (int64_t e = 0; e < model->mesh.n_elements && !averaged; e++)
-        averaged = uz_element_formulation(model, e) == UZ_FORMULATION_BBAR;
-    for (int64_t i = 0; i < n && averaged; i++)
+    for (int64_t i = 0; i < n && x->by_volume; i++)
         most = fmax(most, fabs(times * z[i]));
     return most > 0 ? STEP * model->mesh.extent / most : 1;
 }
@@ -208,16 +260,19 @@ uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_mod
 {
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
     double *place = uz_alloc(2 * n, sizeof *place);
+    const bool by_volume = has_mean_dilatation(model);
     const uz_strain_source from = {
         .model = model, .nodal = u, .free_strain = free_strain, .apart = true, .large = true};
-    uz_strain_source to[2] = {from, from};
-    comparison x = {.model = model, .own = own, .to = times != 0 ? to : NULL, .eta2_of = eta2};
+    uz_strain_source means = from;
+    means.by_volume = by_volume;
+    uz_strain_source to[2] = {means, means};
+    comparison x = {.model = model, .own = own, .to = times != 0 ? to : NULL, .eta2_of = eta2, .by_volume = by_volume};
     uz_status status = UZ_OK;
     x.moved = uz_alloc(2, sizeof *x.moved);
     if (!place || !x.moved)
         status =
             uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the errors of %lld nodes", (long long)model->mesh.n_nodes);
-    x.step = x.to ? step_along(model, z, times) : 1;
+    x.step = x.to ? step_along(&x, z, times) : 1;
     for (int64_t i = 0; i < n && status == UZ_OK && x.to; i++) {
         place[i] = u[i] + x.step * times * z[i];
         place[n + i] = u[i] - x.step * times * z[i];
@@ -227,7 +282,7 @@ uz_status uz_finite_error_energy(double *energy, double *eta2, const uz_body_mod
     if (eta2)
         memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
     if (status == UZ_OK)
-        status = recover_along(&x, &from, err);
+        status = recover_along(&x, &means, err);
     if (status == UZ_OK)
         status = uz_strain_groups(&(uz_strain_work){make_rule, compare, &x}, &from, NULL, err);
     *energy = x.failed ? (double)NAN : x.eta2;

@@ -158,3 +158,57 @@ TEST(elements_have_their_parts)
         uz_scene_clear(&s);
     }
 }
+
+/* Layers that are sheared differently keep the volume, and with mean dilatation means of them do: the modulus of bulk
+ * is none of the difference's, whether the body is warm or not. Means of E have another volume, a square of the
+ * difference. */
+TEST(sheared_layers_say_nothing_of_the_modulus_of_bulk)
+{
+    static const struct {
+        uz_element_kind kind;
+        int way;
+    } OF[] = {{UZ_QUAD4, 4}, {UZ_QUAD4, 5}, {UZ_HEX8, 4}, {UZ_HEX8, 5}};
+    static const double POISSON[] = {0.4, 0.4999};
+    for (int k = 0; k < 4; k++) {
+        double found[2][3];
+        for (int i = 0; i < 2; i++) {
+            uz_scene s = scene_of(OF[k].kind, OF[k].way);
+            s.materials[0].poisson = POISSON[i];
+            s.materials[0].young = 2 * (1 + POISSON[i]);
+            s.materials[0].expansion = 1;
+            uz_body_model model = body_model(&s);
+            const bool ring = model.kind == UZ_AXISYMMETRIC; /* its layers are around the axis */
+            const int dim = model.mesh.dim, along = ring ? 1 : 0, across = ring ? 0 : 1;
+            const int64_t n = model.mesh.n_nodes * dim;
+            const double growth = model.kind == UZ_PLANE_STRAIN ? 0 : 0.05;
+            double *u = body_room(n, sizeof *u), *z = body_room(n, sizeof *z), error,
+                   *eta2 = body_room(model.mesh.n_elements, sizeof *eta2),
+                   *warm = body_room(model.mesh.n_elements, sizeof *warm);
+            for (int64_t a = 0; a < n; a += dim) {
+                const double x = model.mesh.xyz[a + across] - (ring ? 1 : 0);
+                u[a + along] = 0.1 * x * x;
+                z[a + along] = sin(x);
+            }
+            CHECK_INT(uz_finite_mesh_error(&error, eta2, &model, NULL, NULL, u, NULL), UZ_OK);
+            found[i][0] = 0;
+            for (int64_t e = 0; e < model.mesh.n_elements; e++)
+                found[i][0] += eta2[e];
+            CHECK_INT(uz_finite_error_energy(&found[i][1], NULL, &model, NULL, u, z, 0.5, 0.7, NULL), UZ_OK);
+            for (int64_t e = 0; e < model.mesh.n_elements; e++)
+                warm[e] = growth;
+            for (int64_t j = 0; j < n; j++)
+                u[j] += growth * (model.mesh.xyz[j] + u[j]);
+            CHECK_INT(uz_finite_mesh_error(&error, eta2, &model, NULL, warm, u, NULL), UZ_OK);
+            found[i][2] = 0;
+            for (int64_t e = 0; e < model.mesh.n_elements; e++)
+                found[i][2] += eta2[e] / pow(1 + growth, 3);
+            CHECK_MSG(fabs(found[i][2] - found[i][0]) < 1e-9 * found[i][0], "%g warm, %g", found[i][2], found[i][0]);
+            uz_free_all(u, z, eta2, warm);
+            uz_body_model_clear(&model);
+            uz_scene_clear(&s);
+        }
+        for (int j = 0; j < 2; j++)
+            CHECK_MSG(found[0][j] > 1e-3 && fabs(found[1][j] - found[0][j]) < 1e-6 * found[0][j],
+                      "%s: %.12g, not %.12g", uz_element_name(OF[k].kind), found[1][j], found[0][j]);
+    }
+}
