@@ -5,13 +5,15 @@
  * are compared: Newton's first correction alone would say little of slender bodies, whose rotations make strains that
  * are not there. Laws of finite strain then decide which of the two is the answer. Under the linear law, which says
  * nothing of finite strain, it stays and has a warning; rotations are taken into account by St. Venant and Kirchhoff's
- * law, which is the linear one in the strain of Green and Lagrange. */
+ * law, which is the linear one in the strain of Green and Lagrange. Of what nearly keeps its volume that law would keep
+ * the trace of this strain, another volume by the square of the strains, and the neo-Hookean one keeps J. */
 #include "run/finite.h"
 
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "element/element.h"
 #include "post/balance.h"
 #include "run/problem.h"
 #include "run/settings.h"
@@ -91,7 +93,14 @@ static void keep_small(uz_result *small, const uz_result *large, const uz_hooks 
         count_both(s, &large->summary);
 }
 
-/* Of the linear law: by what it is in the strain of Green and Lagrange. */
+/* What stands for the linear law: by what elements of mean dilatation are told by, whatever the elements are. */
+static uz_elasticity law_for_linear(uz_model model, double poisson)
+{
+    const bool rubber = uz_resolve_formulation(UZ_FORMULATION_AUTO, UZ_QUAD4, model, poisson) == UZ_FORMULATION_BBAR;
+    return rubber ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_ST_VENANT_KIRCHHOFF;
+}
+
+/* Of the linear law: by what it is in large deformation. */
 static uz_status compare_linear(uz_result *result, const uz_problem *one, const uz_hooks *hooks, double deadline,
                                 uz_error *err)
 {
@@ -107,7 +116,7 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)one->scene.n_materials);
     for (int64_t i = 0; i < one->scene.n_materials; i++) {
         by_law.scene.materials[i] = one->scene.materials[i];
-        by_law.scene.materials[i].law = UZ_ELASTIC_ST_VENANT_KIRCHHOFF;
+        by_law.scene.materials[i].law = law_for_linear(one->scene.model, one->scene.materials[i].poisson);
     }
     coarse.relative_error = COMPARED_TO;
     const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, NULL, &own);
