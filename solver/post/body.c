@@ -1,7 +1,6 @@
 /* body.c: the state of each element of a scene, from displacements and temperature. */
 #include "post/parts.h"
 
-#include "core/alloc.h"
 #include "core/error.h"
 #include "finite/finite_element.h"
 #include "scene/scene.h"
@@ -12,21 +11,21 @@
 uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err)
 {
     *out = (uz_field_body){.scene = scene, .model = model, .components = model->mesh.dim == 2 ? 4 : 6};
-    if (!scene->free_strain)
-        return uz_free_strains(&out->free_strain, model, scene, err);
+    if (!scene->free_strain) {
+        const uz_status status = uz_free_strains(&out->own, model, scene, err);
+        out->free_strain = out->own;
+        return status;
+    }
     if (scene->n_free_strain != model->mesh.n_elements)
         return uz_fail(err, UZ_ERR_SIZE, "free_strain", "%lld elements have temperatures, and the mesh has %lld",
                        (long long)scene->n_free_strain, (long long)model->mesh.n_elements);
-    out->free_strain = uz_alloc(model->mesh.n_elements, sizeof *out->free_strain);
-    if (!out->free_strain)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");
-    memcpy(out->free_strain, scene->free_strain, (size_t)model->mesh.n_elements * sizeof *out->free_strain);
+    out->free_strain = scene->free_strain;
     return UZ_OK;
 }
 
 void uz_field_body_clear(uz_field_body *body)
 {
-    free(body->free_strain);
+    free(body->own);
     memset(body, 0, sizeof *body);
 }
 

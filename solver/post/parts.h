@@ -13,7 +13,8 @@ typedef struct {
     const uz_scene *scene;
     const uz_body_model *model; /* mesh and contact rows; neither K nor N is read */
     int components;             /* of a stress: 4 or 6 */
-    double *free_strain;        /* n_elements: expansion times rise of temperature; NULL: none has any */
+    const double *free_strain;  /* n_elements: expansion times rise of temperature; NULL: none has any */
+    double *own;                /* what of it is the body's: NULL where the scene knows it */
 } uz_field_body;
 
 /* Borrows scene and model. UZ_ERR_MEMORY; the caller clears *out in every case. */
