@@ -58,6 +58,11 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
 double uz_least_buckling_strain(const uz_body_model *model);
 /* Warns that small deformation is off by `error` (uz_small) under a linear law. */
 void uz_doubt_deformation(uz_evaluation *out, const uz_small *small);
+/* The warning large_strain of an answer u of small deformation, once there is one of large deformation, at_large, of
+ * this scene: it says what stress is off by in the element's middle, or is taken back where neither that nor the whole
+ * body, by `small`, is off by more than it may be. */
+void uz_doubt_strain(uz_evaluation *out, const uz_small *small, const uz_body_model *model, const uz_scene *finite,
+                     const double *u, const double *at_large);
 /* Warns that there was no `lacked` (memory, time) to find out; the answer has its measure (uz_evaluation.nonlinear). */
 void uz_doubt_uncompared(uz_evaluation *out, const char *lacked);
 /* Takes the warning `sliding` back, which turned out to be without ground, and warns of overlap that it had explained.

@@ -42,6 +42,12 @@ static const double COARSE_MESH = 0.1;
 /* Part of the contact forces that springs of a stabilizer may bear before the body is not the one without them. */
 static const double MOST_STABILIZED = 1e-3;
 
+#define STRAINED "large_strain"
+/* The slope of u without which nothing is strained or turns by so much. */
+#define STEEP (0.25 * fmin(MOST_STRAIN, MOST_ROTATION))
+/* Less stress than this part of what such strains take is none: of what is warm and free. */
+#define LEAST_STRESS 1e-3
+
 #define DEGREES (180 / 3.14159265358979323846)
 
 typedef struct {
@@ -195,23 +201,29 @@ static void look_at_some(void *ctx, int64_t begin, int64_t end)
     pthread_mutex_unlock(&look->mutex);
 }
 
-static void look_at_elements(const doubts *d, double slope)
+static void look_at_elements(elements_look *look, const doubts *d)
 {
-    const uz_mesh *mesh = &d->model->mesh;
-    elements_look look = {
+    const double slope = STEEP;
+    *look = (elements_look){
         .d = d,
-        .body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6},
+        .body = {.scene = d->scene, .model = d->model, .components = d->model->mesh.dim == 2 ? 4 : 6},
         .square = slope * slope,
         .mutex = PTHREAD_MUTEX_INITIALIZER,
     };
-    uz_by_pieces(look_at_some, &look, mesh->n_elements);
+    uz_by_pieces(look_at_some, look, d->model->mesh.n_elements);
+}
+
+static void doubt_elements(const doubts *d)
+{
+    elements_look look;
+    look_at_elements(&look, d);
     const double rotation = look.rotation.value, strain = look.strain.value;
     if (rotation > MOST_ROTATION)
         warn(d->out, "large_rotation", rotation,
              "element %lld turns by %.2g rad; small rotations were assumed, and beyond %g they are not small",
              (long long)look.rotation.element, rotation, MOST_ROTATION);
     if (strain > MOST_STRAIN)
-        warn(d->out, "large_strain", strain,
+        warn(d->out, STRAINED, strain,
              "element %lld is strained by %.2g; small strains were assumed, and beyond %g they are not small",
              (long long)look.strain.element, strain, MOST_STRAIN);
 }
@@ -276,6 +288,69 @@ void uz_doubt_deformation(uz_evaluation *out, const uz_small *small)
              "with rotations taken into account (st_venant_kirchhoff) nothing is stable beyond %.3g of the load: take "
              "that law, or neo_hooke",
              small->load);
+}
+
+/* Takes those with this code back; were there any? */
+static bool drop(uz_evaluation *out, const char *code)
+{
+    int kept = 0;
+    for (int i = 0; i < out->n_warnings; i++)
+        if (strcmp(out->warnings[i].code, code) != 0)
+            out->warnings[kept++] = out->warnings[i];
+    const bool dropped = kept < out->n_warnings;
+    out->n_warnings = kept;
+    return dropped;
+}
+
+/* In an element's middle: what the stress of u is off by, of Cauchy's, relative. */
+static double stress_error(const uz_field_body *body, const double *u, const double *at_large, int64_t e)
+{
+    const uz_body_model *model = body->model;
+    const uz_element_type *kind = uz_element_type_of((uz_element_kind)model->mesh.kind[e]);
+    uz_scene scene = *body->scene;
+    uz_field_body small = *body;
+    uz_field_points points = {.count = 1};
+    uz_field_state state[2]; /* large, small */
+    double off = 0, all = 0;
+    scene.kinematics = UZ_KINEMATICS_FIXED;
+    small.scene = &scene;
+    memcpy(points.point[0], uz_element_type_of(kind->linear)->centre, sizeof points.point[0]);
+    for (int k = 0; k < 2; k++) {
+        uz_field_points_init(&points, k == 0 ? body : &small, k == 0 ? at_large : u);
+        uz_field_points_states(&state[k], &points, e);
+    }
+    for (int c = 0; c < body->components; c++) {
+        const double stress = state[0].stress[c], apart = stress - state[1].stress[c];
+        off += (c < 3 ? 1 : 2) * apart * apart;
+        all += (c < 3 ? 1 : 2) * stress * stress;
+    }
+    const double stiff = uz_most_stiffness(uz_element_material(model, e)->lame), *strain = state[1].strain;
+    return sqrt(off) / fmax(sqrt(all), LEAST_STRESS * stiff * sqrt(uz_dot3(strain, strain)));
+}
+
+void uz_doubt_strain(uz_evaluation *out, const uz_small *small, const uz_body_model *model, const uz_scene *finite,
+                     const double *u, const double *at_large)
+{
+    const doubts d = {.model = model, .scene = finite, .u = u};
+    elements_look look;
+    uz_warning *told = NULL;
+    for (int i = 0; i < out->n_warnings; i++)
+        if (strcmp(out->warnings[i].code, STRAINED) == 0)
+            told = &out->warnings[i];
+    if (!told)
+        return;
+    look_at_elements(&look, &d);
+    const int64_t e = look.strain.element;
+    const uz_field_body body = {
+        .scene = finite, .model = model, .components = look.body.components, .free_strain = finite->free_strain};
+    const double error = stress_error(&body, u, at_large, e);
+    if (fmax(error, small->error) <= UZ_MOST_SLIDING)
+        drop(out, STRAINED);
+    else
+        snprintf(told->message, sizeof told->message,
+                 "element %lld is strained by %.2g: small deformation errs by %.2g %% in the stress of its middle, by "
+                 "%.2g %% in %s of the body",
+                 (long long)e, told->value, 100 * error, 100 * small->error, small->in);
 }
 
 void uz_doubt_uncompared(uz_evaluation *out, const char *lacked)
@@ -688,12 +763,7 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene)
 {
     const doubts d = {.model = model, .scene = scene, .out = out};
-    int kept = 0;
-    for (int i = 0; i < out->n_warnings; i++)
-        if (strcmp(out->warnings[i].code, UZ_WARN_SLIDING) != 0)
-            out->warnings[kept++] = out->warnings[i];
-    const bool dropped = kept < out->n_warnings;
-    out->n_warnings = kept;
+    const bool dropped = drop(out, UZ_WARN_SLIDING);
     for (int64_t k = 0; k < scene->n_contacts && dropped; k++)
         look_at_overlap(&d, k);
 }
@@ -704,9 +774,8 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     const uz_summary *s = &result->summary;
     const doubts d = {
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
-    const double slope = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
-    if (is_steep(&d, slope))
-        look_at_elements(&d, slope);
+    if (is_steep(&d, STEEP))
+        doubt_elements(&d);
     uz_status status = UZ_OK;
     d.out->nonlinear = NAN;
     if (scene->kinematics == UZ_KINEMATICS_AUTO && uz_has_finite_model(scene, &model->mesh) &&

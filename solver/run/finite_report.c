@@ -324,5 +324,6 @@ uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, co
     if (most > 0)
         take_greater(&out, off / most, "forces");
     take_greater(&out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
+    uz_doubt_strain(small->evaluation, &out, &run->base, &run->scene, small->u, run->at.u);
     return out;
 }

@@ -214,7 +214,7 @@ LARGE = """Scenes of [large deformation](theory.md#large-deformation) at the dae
 seven each. Below, the block over the roller by elements through its height: by how much its force is off."""
 
 THRESHOLDS = """Of bodies whose load grows (`make extremes FILTER=thresholds`), of every law: the load up to which `auto` has the answer of small deformation, under the
-linear law without a warning, over that up to which this is off by less than 5 % of the answer of large deformation, in displacements, forces and energy."""
+linear law without the warning `large_deformation`, over that up to which this is off by less than 5 % of the answer of large deformation, in displacements, forces and energy."""
 
 SOLIDS = """Of generated solids (`make extremes FILTER=solids`: boxes, wedges, inner nodes moved at random, a re-entrant edge; half of them on planes and balls), two or three
 elements deep, the estimated error of the mesh over the true one, by the potential energy of a mesh of `hex20` that is many times finer."""

@@ -563,6 +563,34 @@ TEST(what_cannot_be_compared_stays)
     }
 }
 
+/* A block between plates, of plane strain: under the linear law its sides are free, and the stress of its middle is off
+ * by 12 % from that of St. Venant and Kirchhoff's law; under neo_hooke they are held and Poisson's ratio is 0, so that
+ * stress is E / 2 (l - 1 / l), 3 % more than E (l - 1), and nothing is left to warn of. Both in closed form. */
+TEST(strains_are_doubted_for_the_stress_they_make)
+{
+    const double by = 0.06, l = 1 - by, nu = 0.3, S = (l * l - 1) / 2 / (1 - nu * nu);
+    const double wide = sqrt(1 - nu * (1 + nu) * 2 * S), small[2] = {-by / (1 - nu * nu), -nu * by / (1 - nu * nu)},
+                 large[2] = {l * S / wide, nu * S / (wide * l)};
+    const double off = hypot(small[0] - large[0], small[1] - large[1]) / hypot(large[0], large[1]);
+    for (int held = 0; held < 2; held++) {
+        uz_scene s = squeezed(by);
+        char told[80];
+        if (held) {
+            body_hold(&s, "right", 0, NAN, NAN);
+            s.materials[0].poisson = 0;
+        }
+        uz_result *result = solve_as(&s, UZ_KINEMATICS_AUTO, held ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_LINEAR);
+        const uz_warning *w = warning(result, "large_strain");
+        const uz_small *found = &result->summary.small;
+        snprintf(told, sizeof told, "by %.2g %% in the stress of its middle, by %.2g %% in %s", 100 * off,
+                 100 * found->error, found->in);
+        CHECK(found->compared && result->summary.geometry.kind == UZ_KINEMATICS_FIXED);
+        CHECK_MSG((w != NULL) == !held && (held || strstr(w->message, told)), "%s, not %s", w ? w->message : "", told);
+        uz_result_free(result);
+        uz_scene_clear(&s);
+    }
+}
+
 /* Laws of finite strain want all that finite kinematics want, also where the body is known from an answer before. */
 TEST(what_there_is_no_model_for_is_refused)
 {
