@@ -33,8 +33,10 @@ enum { MOST_HALVINGS = 200 };
 /* The caller is asked whether to go on after so many elements. */
 enum { ELEMENTS_BETWEEN = 64 };
 
-/* A row is pressed where its reaction is more than this part of the largest. */
-#define PRESSED 1e-12
+/* A row is pressed where its reaction is more than this part of the largest, and more than what rounding makes: that
+ * part of what the stiffest dof takes to go as far as the body is large. */
+#define PRESSED  1e-12
+#define NO_FORCE 1e-15
 /* Pivots that are less than this part of the stiffness of their dof may be zero. */
 #define LEAST_PIVOT 1e-11
 /* Stiffness along pressed rows, in those of the stiffest dof: only where motions that leave the rows closed are stable
@@ -53,6 +55,7 @@ typedef struct {
     uz_csc wide;                     /* K with entries of rows between bodies, where there are any: it is tangent's */
     long double *force;              /* n_nodes x dim: internal */
     double *f, *room, *size;         /* d */
+    double pressed;                  /* rows are, whose reaction is more */
     long double energy, small, unit; /* small: of small strain; unit: of a strain of 1 */
 } work;
 
@@ -528,7 +531,7 @@ static void place_curvature(double *ke, double force, const double *n, const uz_
 
 /* What the obstacle's curvature does to the stiffness: the Lagrangian has r g. The edges of lines and tables are none:
  * rows take them as rounded. A row of the middle of an eight-node face is one of several nodes: it has r'g by node. */
-static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double most, uz_error *err)
+static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
     const int dim = model->mesh.dim;
@@ -542,7 +545,7 @@ static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double mos
         const int64_t *node;
         double x[3], ke[9 * UZ_FACE_NODES * UZ_FACE_NODES];
         uz_gap at;
-        if (!(fabs(force[row]) > PRESSED * most) || !obstacle[model->info.contact_of[row]] ||
+        if (!(fabs(force[row]) > w->pressed) || !obstacle[model->info.contact_of[row]] ||
             model->sites[model->info.contact_of[row]].n == 0)
             continue;
         const int n = row_place(x, &node, &share, w->of, row);
@@ -557,13 +560,13 @@ static uz_status add_curvature(work *w, uz_obstacle *const *obstacle, double mos
 }
 
 /* Stiffness along the pressed rows, times `factor` more than there is already. */
-static uz_status add_along(work *w, double factor, double most, uz_error *err)
+static uz_status add_along(work *w, double factor, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
     uz_csc *K = &w->tangent.K, rows = {0};
     const uz_status status = uz_csc_transpose(&rows, &model->N, err);
     for (int64_t row = 0; row < model->m && status == UZ_OK; row++)
-        for (int64_t p = rows.ptr[row]; p < rows.ptr[row + 1] && w->of->r[row] < -PRESSED * most; p++)
+        for (int64_t p = rows.ptr[row]; p < rows.ptr[row + 1] && w->of->r[row] < -w->pressed; p++)
             for (int64_t q = rows.ptr[row]; q <= p; q++) {
                 const int64_t at = uz_csc_find(K, rows.idx[p], rows.idx[q]);
                 if (at >= 0)
@@ -647,11 +650,11 @@ static uz_status look_at_side(uz_finite_certificate *out, double *apart, const u
 /* Does a row press where no side around its node comes near the obstacle? Those of middles, which have a share of
  * their ends' gaps, do where sides are long against a curved obstacle. */
 static void look_for_pressed_apart(uz_finite_certificate *out, const uz_finite_answer *of, const double *apart,
-                                   int64_t contact, double most)
+                                   int64_t contact, double pressed)
 {
     const uz_body_model *model = of->model;
     for (int64_t i = 0; i < model->m; i++)
-        if (model->info.contact_of[i] == contact && !uz_row_inner(model, i) && of->r[i] < -PRESSED * most &&
+        if (model->info.contact_of[i] == contact && !uz_row_inner(model, i) && of->r[i] < -pressed &&
             isfinite(apart[model->info.contact_node[i]]))
             out->pressed_apart = fmax(out->pressed_apart, apart[model->info.contact_node[i]]);
 }
@@ -679,7 +682,7 @@ static uz_status look_at_rows(uz_finite_certificate *out, const uz_finite_answer
 }
 
 /* Reactions, gaps at rows and between them, and what curvature adds to the tangent. */
-static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double most, uz_error *err)
+static uz_status look_at_contacts(uz_finite_certificate *out, work *w, uz_error *err)
 {
     const uz_finite_answer *of = w->of;
     const int64_t n = of->scene->n_contacts;
@@ -699,22 +702,20 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, double mo
         for (int64_t i = 0; status == UZ_OK && i < group->n_faces; i++)
             status = look_at_side(out, apart, of, group->face[i], obstacle[k], err);
         if (status == UZ_OK && group->n_faces > 0)
-            look_for_pressed_apart(out, of, apart, k, most);
+            look_for_pressed_apart(out, of, apart, k, w->pressed);
         bool inside = false;
         if (status == UZ_OK)
             status = uz_swallows(&inside, of->model, of->scene, k, of->u, err);
         out->swallows = out->swallows || inside;
     }
     if (status == UZ_OK)
-        status = add_curvature(w, obstacle, most, err);
+        status = add_curvature(w, obstacle, err);
     if (status == UZ_OK)
         status = look_at_rows(out, of, obstacle, err);
     for (int64_t k = 0; k < n && obstacle; k++)
         uz_obstacle_free(obstacle[k]);
     free(obstacle);
     free(apart);
-    for (int64_t i = 0; i < of->model->m; i++)
-        out->worst_reaction = fmax(out->worst_reaction, most > 0 ? of->r[i] / most : of->r[i]);
     return status;
 }
 
@@ -759,7 +760,7 @@ static uz_status leave_over(work *w, uz_error *err)
 
 /* Of rows between bodies the tangent has how they turn, and room for stiffness along them. *known: it could be found.
  */
-static uz_status add_turn(bool *known, work *w, double most, uz_error *err)
+static uz_status add_turn(bool *known, work *w, uz_error *err)
 {
     const uz_finite_answer *of = w->of;
     uz_row_turn turn = {.known = true};
@@ -767,10 +768,10 @@ static uz_status add_turn(bool *known, work *w, double most, uz_error *err)
     *known = true;
     if (!uz_has_pairs(of->scene))
         return UZ_OK;
-    uz_status status = uz_row_turn_find(&turn, of->rest, of->model, of->scene, of->r, PRESSED * most, w->stop, err);
+    uz_status status = uz_row_turn_find(&turn, of->rest, of->model, of->scene, of->r, w->pressed, w->stop, err);
     *known = turn.known;
     if (status == UZ_OK)
-        status = uz_widen_by_rows(&wide, &w->tangent.K, &of->model->N, of->r, PRESSED * most, &turn, err);
+        status = uz_widen_by_rows(&wide, &w->tangent.K, &of->model->N, of->r, w->pressed, &turn, err);
     uz_row_turn_clear(&turn);
     if (status != UZ_OK) {
         uz_csc_clear(&wide);
@@ -805,27 +806,27 @@ static double off_support(const uz_finite_answer *of, int64_t a, int c)
 }
 
 /* The factor of H, and with it the residual. */
-static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_error *err)
+static uz_status judge(uz_finite_certificate *out, work *w, uz_error *err)
 {
     const uz_body_model *model = w->of->model;
     const uz_csc *K = &w->tangent.K;
     bool known;
     double stiffest = 0, work_left = 0, square = 0, there = 0;
-    uz_status status = add_turn(&known, w, most, err);
+    uz_status status = add_turn(&known, w, err);
     for (int64_t j = 0; j < model->d && status == UZ_OK; j++) {
         w->size[j] = fabs(K->val[K->ptr[j]]);
         stiffest = fmax(stiffest, w->size[j]);
     }
     for (size_t k = 0; k < sizeof ALONG / sizeof ALONG[0] && status == UZ_OK && !out->definite && known; k++) {
         uz_envelope factor = {0};
-        status = add_along(w, ALONG[k] * stiffest - there, most, err);
+        status = add_along(w, ALONG[k] * stiffest - there, err);
         there = ALONG[k] * stiffest;
         if (status == UZ_OK)
             status = uz_envelope_factor(&factor, &out->definite, K, w->size, LEAST_PIVOT, w->stop, err);
         if (status == UZ_OK && out->definite) {
             for (int64_t j = 0; j < model->d; j++) /* the step also closes the pressed rows */
                 for (int64_t q = model->N.ptr[j]; q < model->N.ptr[j + 1]; q++)
-                    if (w->of->r[model->N.idx[q]] < -PRESSED * most)
+                    if (w->of->r[model->N.idx[q]] < -w->pressed)
                         w->f[j] += there * model->N.val[q] * w->of->g[model->N.idx[q]];
             uz_envelope_forward(w->f, &factor, w->room);
         }
@@ -836,7 +837,7 @@ static uz_status judge(uz_finite_certificate *out, work *w, double most, uz_erro
     for (int64_t j = 0; j < model->d; j++)
         square += w->f[j] * w->f[j];
     for (int64_t i = 0; i < model->m; i++)
-        work_left += w->of->r[i] < -PRESSED * most ? 0 : fabs(w->of->r[i] * w->of->g[i]);
+        work_left += w->of->r[i] < -w->pressed ? 0 : fabs(w->of->r[i] * w->of->g[i]);
     const double tiny = TINY * TINY * (double)w->unit, energy = out->energy > tiny ? out->energy : (double)w->small;
     const double left = sqrt(square + 2 * work_left), norm = sqrt(2 * energy);
     const double rounding = ROUNDING * sqrt((double)w->unit);
@@ -852,7 +853,7 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
     const uz_body_model *model = answer->model;
     const int dim = model->mesh.dim;
     work w = {.of = answer, .stop = stop};
-    double most = 0;
+    double most = 0, stiffest = 0;
     *out = (uz_finite_certificate){.least_det = INFINITY,
                                    .residual = INFINITY,
                                    .unstrained = true,
@@ -865,6 +866,8 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
                   : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the tangent of %lld dofs", (long long)model->d);
     for (int64_t i = 0; i < model->m; i++)
         most = fmax(most, fabs(answer->r[i]));
+    for (int64_t i = 0; i < model->m; i++)
+        out->worst_reaction = fmax(out->worst_reaction, most > 0 ? answer->r[i] / most : answer->r[i]);
     for (int64_t i = 0; i < dim * model->mesh.n_nodes && status == UZ_OK; i++)
         out->worst_support = fmax(out->worst_support, fabs(off_support(answer, i / dim, (int)(i % dim))));
     out->worst_support = fmax(out->worst_support, uz_rigid_groups_off(answer));
@@ -874,15 +877,18 @@ uz_status uz_certify_finite(uz_finite_certificate *out, const uz_finite_answer *
     }
     if (status == UZ_OK && !out->stopped)
         add_springs(&w);
+    for (int64_t j = 0; j < model->d && status == UZ_OK; j++)
+        stiffest = fmax(stiffest, w.tangent.K.val[w.tangent.K.ptr[j]]);
+    w.pressed = fmax(PRESSED * most, NO_FORCE * stiffest * model->mesh.extent);
     out->energy = (double)w.energy;
     if (status == UZ_OK && !out->stopped)
         status = add_pressures(&w, err);
     if (status == UZ_OK && !out->stopped)
-        status = look_at_contacts(out, &w, most, err);
+        status = look_at_contacts(out, &w, err);
     if (status == UZ_OK && !out->stopped && out->least_det > 0)
         status = leave_over(&w, err);
     if (status == UZ_OK && !out->stopped && out->least_det > 0)
-        status = judge(out, &w, most, err);
+        status = judge(out, &w, err);
     if (w.wide.ptr)
         uz_csc_clear(&w.wide);
     else
