@@ -59,21 +59,11 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
         status = starts && starts[i] ? check_start(starts[i], &one, err) : UZ_OK;
         if (status == UZ_OK)
             status = uz_solve_semicoercive(&results[i], &one, settings, cache, hooks, rounds, started, err);
-        if (status == UZ_ERR_FREE_BODY && results[i] && results[i]->summary.outcome == UZ_UNHELD) {
+        if (status != UZ_OK)
             name_case(err, problem, i);
-            if (unheld++ == 0 && err)
-                first = *err;
-            if (unheld == n && err)
-                *err = first;
-            if (unheld == n)
-                break;
-            uz_error_reset(err); /* others may have an answer */
-            status = UZ_OK;
-        }
-        if (status == UZ_OK)
-            continue;
-        name_case(err, problem, i);
-        break;
+        uz_pass_unheld(&status, &unheld, &first, results[i], n, err);
+        if (status != UZ_OK)
+            break;
     }
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         const uz_problem one = uz_problem_of_case(problem, i);

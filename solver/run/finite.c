@@ -13,6 +13,7 @@
 #include "core/vector3.h"
 #include "run/problem.h"
 #include "run/results.h"
+#include "run/semicoercive.h"
 #include "run/settings.h"
 #include "run/solve.h"
 #include "scene/check.h"
@@ -247,7 +248,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     run->cache = uz_cache_new(CACHE_BYTES);
     if (!copied || !run->cache)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
-    uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_SUPPORTED, err);
+    uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_HELD, err);
     if (status == UZ_OK)
         status = check_ties(&run->base, &run->scene, err);
     if (status == UZ_OK)
@@ -479,6 +480,30 @@ static uz_status take_point(uz_finite_point **out, const uz_finite_run *run, uz_
     return UZ_OK;
 }
 
+/* Is the whole load one that presses a body on its obstacles that supports leave free? *out: of one that does not, with
+ * UZ_ERR_FREE_BODY, what is told of it beside other cases. */
+static uz_status look_for_hold(uz_result **out, uz_finite_run *run, double start, uz_error *err)
+{
+    uz_error own = {0};
+    uz_problem under = *run->problem;
+    uz_status status = put_on(run, 1, err);
+    if (status == UZ_OK)
+        status = uz_finite_check_pressed(run, &own);
+    if (status == UZ_OK)
+        return UZ_OK;
+    if (status == UZ_ERR_FREE_BODY) {
+        under.scene = run->scene;
+        under.n_quantities = 0;
+        const uz_error why = own;
+        const uz_status told = uz_tell_unheld(out, &under, &run->settings, &why, start, &own);
+        status = told == UZ_OK ? status : told;
+        own = told == UZ_OK ? why : own;
+    }
+    if (err)
+        *err = own;
+    return status;
+}
+
 uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_settings *settings,
                                const uz_hooks *hooks, double deadline, const uz_result *small,
                                const uz_finite_path *path, uz_error *err)
@@ -488,14 +513,19 @@ uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_
     const double start = uz_seconds();
     double tried = 0;
     uz_status status = begin(&run, one, settings, hooks, deadline, path, err);
+    if (status == UZ_OK && run.base.n_modes > 0)
+        status = look_for_hold(out, &run, start, err);
+    const bool unheld = status == UZ_ERR_FREE_BODY && *out;
     if (status == UZ_OK)
         status = put_on_all(&why, &tried, &run, err);
     if (status == UZ_OK) {
         run.spent.total = uz_seconds() - start;
         status = uz_finite_report(out, &run, why, tried, err);
     }
-    if (status == UZ_OK && path && path->to)
-        status = take_point(path->to, &run, why, tried, err);
+    if ((status == UZ_OK || unheld) && path && path->to) {
+        const uz_status taken = take_point(path->to, &run, why, tried, err);
+        status = taken == UZ_OK ? status : taken;
+    }
     if (status == UZ_OK && small)
         (*out)->summary.small = uz_finite_compare(&run, *out, small);
     end(&run);
@@ -566,6 +596,8 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     const double deadline = uz_seconds() + settings->time_limit_s;
     uz_finite_point **points = uz_alloc_zero(n, sizeof *points);
+    int64_t unheld = 0;
+    uz_error first = {0};
     uz_status status = points ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld load cases", (long long)n);
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
         if (uz_cancelled(hooks)) {
@@ -576,6 +608,7 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
             hooks->begins(hooks->ctx, i);
         status =
             solve_case(&results[i], points, problem, i, near ? near[i] : NULL, effort, settings, hooks, deadline, err);
+        uz_pass_unheld(&status, &unheld, &first, results[i], n, err);
     }
     for (int64_t i = 0; i < n && points; i++)
         uz_finite_point_free(points[i]);

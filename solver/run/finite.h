@@ -7,6 +7,7 @@
  *     uz_finite_chord    finite_chord.c    steps on the factor of the last one
  *     uz_finite_turn     finite_turn.c     large steps of parts that turn
  *     uz_finite_correct  finite_pairs.c    what rows between bodies need in it
+ *     uz_finite_hold_free  finite_free.c   bodies that only obstacles hold
  *     uz_finite_may_pass finite_passing.c  what a part may not have gone through
  *     uz_finite_report   finite_report.c   the answer as a result
  *     uz_finite_quantities  finite_quantities.c  the numbers that it was asked for
@@ -177,6 +178,15 @@ uz_status uz_finite_place_groups(uz_finite_place *place, const uz_finite_run *ru
 /* The free dofs (d) of a place, and the displacement (n) that others lead to from there by a straight step. */
 void uz_finite_restrict(double *v, const uz_finite_place *place);
 void uz_finite_lead(double *to, const uz_finite_place *place, const double *v);
+
+/* Of a body that supports leave free (finite_free.c): run->tangent gets soft springs, which are at rest by `rest` (d)
+ * from where the body is, as run->p has it; NULL: there. */
+void uz_finite_hold_free(uz_finite_run *run, const double *rest);
+/* Where it begins, at rest: run->tangent becomes its stiffness there, without what stress of warmth or pressures make
+ * of motions that nothing holds yet. */
+void uz_finite_begin_free(uz_finite_run *run);
+/* Do the loads run->loads press the body at rest on, in all motions that supports leave free? UZ_ERR_FREE_BODY. */
+uz_status uz_finite_check_pressed(const uz_finite_run *run, uz_error *err);
 
 /* From run->at to the equilibrium under run->load. On UZ_PART_SETTLED run->at, r and certificate are those of the
  * equilibrium; else run->at is somewhere. */

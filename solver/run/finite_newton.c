@@ -12,6 +12,7 @@
  * body is added: both cost steps; along a path from another case the part is given up there, as the equilibrium
  * beyond may be another one. Where all supports move alike, the body is carried along before the first one.
  * Steps that turn slender parts lead to where these have their length (finite_turn.c).
+ * Bodies that only obstacles hold: finite_free.c.
  * After a large step that turns parts K first has the stress that the step was made for (finite_element.c), which takes
  * half of the steps where slender ones do; where it is not positive definite with that the body's own comes next, after
  * other large steps at once, with stiffness along the pressed rows. Steps are
@@ -355,12 +356,14 @@ static bool was_large(const uz_finite_run *run)
 }
 
 /* Stiffness along pressed rows without which more than half of the tangents are not positive definite, each of which
- * would take a factorization to be seen. Between bodies K would have to be widened for it. */
+ * would take a factorization to be seen. Between bodies K would have to be widened for it. Bodies that only obstacles
+ * hold (finite_free.c) are not stable without. */
 static double hold_at_once(const uz_finite_run *run, bool as_stepped)
 {
     if (run->turned)
         return TURNED_HOLD;
-    return as_stepped || run->pairs || !is_more(run->norm, LARGE_STEP) ? 0 : LEAST_HOLD;
+    const bool may_do = as_stepped || run->pairs || !is_more(run->norm, LARGE_STEP);
+    return may_do && run->base.n_modes == 0 ? 0 : LEAST_HOLD;
 }
 
 static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
@@ -379,7 +382,9 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
     /* from there on each digit counts; of the step from a place without energy the norm is not known */
     run->settings.step = !(run->norm < CHORD_STEP) || (run->step_qps == 1 && run->norm == 0);
     const double stiffest = run->stiffest;
-    const bool roughly = was_large(run);
+    const bool leans = run->base.n_modes > 0; /* on rows, which have to hold it, however hard they are pressed */
+    const bool at_rest = leans && run->step_qps == 0 && run->n_r == 0 && !run->near;
+    const bool roughly = !leans && was_large(run);
     addition add = {.hold = roughly ? 0 : run->hold, .shift = run->shift / LESS_SHIFT};
     add.shift = add.shift < FIRST_SHIFT ? 0 : add.shift;
     double held = 0, shifted = 0; /* what the tangent has of them */
@@ -392,7 +397,7 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         step[i] = run->at.u[i] - run->trial.u[i];
     for (int64_t i = 0; i < run->n_r && run->n_r == run->at.rows.m; i++)
         pressed = pressed || run->r[i] < 0;
-    if (pressed && !roughly && add.hold == 0 && add.shift == 0)
+    if (pressed && !roughly && add.hold == 0 && (add.shift == 0 || leans))
         add.hold = hold_at_once(run, step != NULL);
     while (more && (status == UZ_ERR_NOT_SPD || status == UZ_ERR_FREE_BODY)) {
         const double start = uz_seconds();
@@ -401,8 +406,12 @@ static uz_status solve_definite(bool *moved, uz_finite_run *run, uz_error *err)
         status = fresh ? find_tangent(run, step, add.straight, &own) : UZ_OK;
         if (fresh)
             held = shifted = 0;
+        if (fresh && at_rest)
+            uz_finite_begin_free(run);
         for (int64_t q = 0; q < K->ptr[K->cols] && add.shift > shifted; q++)
             K->val[q] += (add.shift - shifted) * run->base.K.val[q];
+        if (fresh)
+            uz_finite_hold_free(run, NULL);
         if (status == UZ_OK && run->pairs)
             status = uz_finite_widen(run, add.hold > 0, &own);
         if (status == UZ_OK)

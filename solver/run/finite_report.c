@@ -92,8 +92,11 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     default:
         snprintf(text, size,
                  "no stable equilibrium was found under %.6g of %s: the last one is that under %.6g of it, and "
-                 "this is the answer there. A limit load or a bifurcation; prescribed displacements may pass it",
-                 tried, of, load);
+                 "this is the answer there. %s",
+                 tried, of, load,
+                 run->base.n_modes > 0
+                     ? "Contact alone holds the body: it slides, tips over or has room; or a limit load"
+                     : "A limit load or a bifurcation; prescribed displacements may pass it");
     }
 }
 

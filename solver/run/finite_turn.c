@@ -58,6 +58,7 @@ uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
     run->unturned = found.turning < LITTLE_TURNING * LITTLE_TURNING * found.strain;
     if (!*turned)
         return UZ_OK;
+    uz_finite_restrict(run->Kv, to);
     memcpy(to->u, near, bytes);
     uz_finite_forget_factors(run);
     uz_status status = uz_finite_place_groups(to, run, err);
@@ -67,6 +68,10 @@ uz_status uz_finite_turn(bool *turned, uz_finite_run *run, uz_error *err)
     uz_turning_metric(&run->tangent, model);
     uz_gather_nodal(run->p, &to->turned, force);
     uz_finite_move_supports(&moved, run, to);
+    uz_finite_restrict(run->v, to);
+    for (int64_t j = 0; j < run->d; j++)
+        run->Kv[j] -= run->v[j];
+    uz_finite_hold_free(run, run->Kv); /* what nothing holds goes as far as the step does */
     status = solve_metric(run, err);
     if (status != UZ_OK)
         return status;

@@ -82,6 +82,21 @@ bool uz_is_unproved(const uz_summary *s)
     return s->guarantee.asked && !(quantity ? e->quantities[0].guaranteed : s->guarantee.proved);
 }
 
+void uz_pass_unheld(uz_status *status, int64_t *unheld, uz_error *first, const uz_result *result, int64_t n,
+                    uz_error *err)
+{
+    if (*status != UZ_ERR_FREE_BODY || !result || result->summary.outcome != UZ_UNHELD)
+        return;
+    if ((*unheld)++ == 0 && err)
+        *first = *err;
+    if (*unheld < n) {
+        uz_error_reset(err);
+        *status = UZ_OK;
+    } else if (err) {
+        *err = *first;
+    }
+}
+
 void uz_judge_quantity(uz_result *result)
 {
     uz_summary *s = &result->summary;

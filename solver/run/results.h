@@ -17,6 +17,10 @@ uz_status uz_describe_scene(uz_result *result, const uz_body_model *model, const
                             const double *prescribed, int64_t m, uz_ahead *ahead, uz_error *err);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
+/* One of n cases that was refused as UZ_UNHELD takes no answer from the others: *status becomes UZ_OK, but where all of
+ * them are, which is refused as the first one was. unheld, first: how many there were before, and why; 0 at first. */
+void uz_pass_unheld(uz_status *status, int64_t *unheld, uz_error *first, const uz_result *result, int64_t n,
+                    uz_error *err);
 /* An answer that converged, but on a mesh that leaves the first quantity a wider interval than was asked for, ends as
  * UZ_MESH_LIMIT. */
 void uz_judge_quantity(uz_result *result);

@@ -360,6 +360,30 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
     return status;
 }
 
+static void clear(uz_semi *s)
+{
+    uz_free_all(s->load, s->prescribed, s->inverse, s->stiffness, s->soft, s->weight, s->target, s->active, s->provable,
+                s->null_space);
+    uz_csc_clear(&s->Nt);
+    if (s->is_scene)
+        uz_body_model_clear(&s->model);
+    uz_result_free(s->last);
+    uz_cache_free(s->own_cache);
+}
+
+uz_status uz_tell_unheld(uz_result **out, const uz_problem *problem, const uz_settings *settings, const uz_error *why,
+                         double started, uz_error *err)
+{
+    uz_semi s = {.problem = problem, .with_factor = *settings, .is_scene = true, .started = started};
+    s.settings = &s.with_factor;
+    s.requested = uz_requested_error(settings);
+    uz_status status = prepare(&s, err);
+    if (status == UZ_OK)
+        status = uz_semi_refuse(out, &s, why, err);
+    clear(&s);
+    return status;
+}
+
 uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, const uz_settings *settings,
                                 uz_cache *cache, const uz_hooks *hooks, uz_status refused, double started,
                                 uz_error *err)
@@ -402,14 +426,6 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
     } else if (err && !(status == UZ_ERR_NOT_SPD && refused == UZ_ERR_NOT_SPD)) {
         *err = own;
     }
-    void *room[] = {s.load,   s.prescribed, s.inverse, s.stiffness, s.soft,
-                    s.weight, s.target,     s.active,  s.provable,  s.null_space};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
-    uz_csc_clear(&s.Nt);
-    if (s.is_scene)
-        uz_body_model_clear(&s.model);
-    uz_result_free(s.last);
-    uz_cache_free(s.own_cache);
+    clear(&s);
     return status;
 }

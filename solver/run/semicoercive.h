@@ -26,4 +26,8 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
                                 uz_cache *cache, const uz_hooks *hooks, uz_status refused, double started,
                                 uz_error *err);
 
+/* *out: the same result of a scene that was found to be so in another way, `why` being that refusal. */
+uz_status uz_tell_unheld(uz_result **out, const uz_problem *problem, const uz_settings *settings, const uz_error *why,
+                         double started, uz_error *err);
+
 #endif

@@ -60,7 +60,7 @@ static bool is_asked(const uz_result *result, const uz_problem *one, bool own_la
         return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
     if (has_orthotropic(&one->scene)) /* there is no law to compare with: a warning has told */
         return false;
-    return e->nonlinear > UZ_SURELY_SMALL && s->semicoercive.free_modes == 0; /* NaN: nothing to compare with */
+    return e->nonlinear > UZ_SURELY_SMALL; /* NaN: nothing to compare with */
 }
 
 /* ---- the comparison */
@@ -130,8 +130,10 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
             *err = own;
         return status;
     }
-    if (status != UZ_OK) /* there is no large deformation of it, as where a support holds a node in an obstacle */
+    if (status != UZ_OK) { /* there is no large deformation of it, as where a support holds a node in an obstacle */
+        uz_result_free(large);
         return UZ_OK;
+    }
     const uz_outcome outcome = large->summary.outcome;
     const bool ended = outcome == UZ_UNSTABLE || outcome == UZ_INVERTED || large->summary.small.load == 1;
     count_both(&result->summary, &large->summary);
@@ -143,19 +145,6 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
         uz_doubt_uncompared(result->evaluation, "time");
     uz_result_free(large);
     return UZ_OK;
-}
-
-/* A body that only obstacles hold has an answer of small deformation alone, which may not be enough. */
-static uz_status refuse_free(const uz_result *small, const uz_error *own, uz_error *err)
-{
-    const double part = small->evaluation->nonlinear;
-    char why[96] = "gaps and normals are not those of the body at rest where it has slid to";
-    if (part > UZ_SURELY_SMALL)
-        snprintf(why, sizeof why, "small deformation leaves out some %.2g %% of the forces", 100 * part);
-    return uz_fail(
-        err, UZ_ERR_FREE_BODY, own->where,
-        "%s, and large deformation has no answer: %.320s; or take the law linear, which is not compared then", why,
-        own->message);
 }
 
 /* *large NULL: it was stopped, and the answer of small deformation stays. */
@@ -170,9 +159,11 @@ static uz_status solve_large(uz_result **large, uz_result *small, const uz_probl
         *large = NULL;
         return UZ_OK;
     }
-    if (status == UZ_ERR_FREE_BODY)
-        return refuse_free(small, &own, err);
-    if (status != UZ_OK && err)
+    if (status == UZ_OK)
+        return UZ_OK;
+    uz_result_free(*large); /* what is told of a load that does not press the body on */
+    *large = NULL;
+    if (err)
         *err = own;
     return status;
 }

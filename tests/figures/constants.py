@@ -110,7 +110,7 @@ PHRASES = {
     "(quad4 and hex8, as of small strain: from Poisson's ratio 0.4 on": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
     "by `auto` from Poisson's ratio 0.4 on, in plane strain": None, "with each law, from 0.4 on or by `bbar`": None,
     "a ring of ratio 0.499 took 2.9 times the force": None, "takes 1 % less force with 192 `quad4`": None, "as `standard` 2.9 times the force": None,  # test_finite_rubber
-    "(Nagtegaal, Parks and Rice, 1974; Simo, Taylor and Pister, 1985)": None, "Mechanics and Engineering 4, 1974": None, "Mechanics and Engineering 51, 1985": None,
+    "(Nagtegaal, Parks and Rice, 1974; Simo, Taylor and Pister, 1985)": None, "(Rockafellar 1976)": None, "Control and Optimization 14, 1976": None, "Mechanics and Engineering 4, 1974": None, "Mechanics and Engineering 51, 1985": None,
     "(Huang and others, 2011)": None, "Computer Graphics 17, 2011": None,
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,
     "Mathematical Programming Computation 4, 2012": None,

@@ -32,7 +32,7 @@ static void answer(answered *a, const uz_scene *scene)
     a->scene = *scene;
     CHECK_MSG(uz_solve(&a->result, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
     CHECK_INT(a->result->summary.outcome, UZ_CONVERGED);
-    CHECK_INT(uz_body_model_build(&a->base, scene, UZ_BODY_SUPPORTED, &err), UZ_OK);
+    CHECK_INT(uz_body_model_build(&a->base, scene, UZ_BODY_HELD, &err), UZ_OK);
     a->scene.place = a->result->u;
     CHECK_INT(uz_body_turned(&a->turned, &a->base, a->result->u, &err), UZ_OK);
     CHECK_INT(uz_body_model_move(&a->there, &a->turned, &a->scene, &err), UZ_OK);
@@ -114,6 +114,27 @@ TEST(springs_and_rigid_groups)
     for (int64_t i = 0; i < n; i++)
         r->u[2 * i] += r->mesh.xyz[2 * i] > 1 - 1e-9 ? 1e-6 : 0;
     CHECK(judge(&a).worst_support < 1e-14 && judge(&a).residual > 1e-6);
+    give_back(&a);
+}
+
+/* A block that its load presses on a plane, which alone holds it: not without reactions, nor by what rounding has of
+ * them. */
+TEST(what_presses_holds_a_body)
+{
+    uz_scene s = block("quad8", 2, UZ_ELASTIC_NEO_HOOKE);
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.2, 0);
+    answered a;
+    answer(&a, &s);
+    const uz_finite_certificate c = judge(&a);
+    CHECK_MSG(c.definite && c.residual <= 1e-8, "%g", c.residual);
+    for (int64_t i = 0; i < a.result->m; i++)
+        a.result->r[i] = -1e-17;
+    CHECK(!judge(&a).definite);
+    for (int64_t i = 0; i < a.result->m; i++)
+        a.result->r[i] = 0;
+    CHECK(!judge(&a).definite && isinf(judge(&a).residual));
     give_back(&a);
 }
 
