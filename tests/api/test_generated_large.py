@@ -30,6 +30,14 @@ def test_generated_large_deformation(s):
         check(len({getattr(scene, key) for scene in scenes}) == kinds, key)
 
 
+def test_generated_bodies_that_lean_on_their_obstacle(s):
+    """A force presses them on; some roll off, and the load of some pushes them away."""
+    outcomes, numbers = {}, [n for n in range(500, 540) if generated_large.Scene(n).model == "plane_strain"]
+    false = [said for said in (generated_large.look(s, number, outcomes, CHECKER, True) for number in numbers) if said]
+    check(not false, false)
+    check(outcomes["converged"] >= len(numbers) / 2, outcomes)
+
+
 def test_an_answer_that_is_off_is_seen(s):
     """By a ten-thousandth at one node away from the contact, so far that a cell is inside out, by a millionth at one on the
     obstacle, and where a force is left out."""

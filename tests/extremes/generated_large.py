@@ -1,6 +1,7 @@
 """Generated scenes of large deformation, held against code of its own: bodies of quad4, quad8, tri3 and hex8, bent at random, in plane
 strain, as rings and as solids, of every law, some nearly incompressible, pressed on planes, circles and spheres by supports and loads, some of them warm or cold, along
-paths too, a third of them with a side on springs or with nodes that are a rigid group.
+paths too, a third of them with a side on springs or with nodes that are a rigid group. Then others in plane strain that lean on their obstacle:
+a force presses their upper side on, which is held along it alone; some of them roll off.
 
 What claims to have converged must be in equilibrium: with elements and laws written once more, in quadruple precision (large/checker.c),
 forces vanish on free dofs away from the contact; on it they press, and along the obstacle there are none. No point of a fine grid in any
@@ -24,9 +25,9 @@ LEFT_OVER, DEEP, OFF, MIRRORED = 1e-6, 1e-8, 1e-9, 1e-8  # of the largest nodal 
 
 
 class Scene:
-    """A block of one to three by one, bent; its lower side is on an obstacle, its upper one moves or is loaded."""
+    """A block of one to three by one, bent; its lower side is on an obstacle, its upper one moves or is loaded (leaning)."""
 
-    def __init__(self, number):
+    def __init__(self, number, leaning=False):
         rng = random.Random(f"large {number}")
         self.number, self.law = number, rng.choice(LAWS)
         self.element = rng.choice(("quad4", "quad8", "tri3", "hex8"))
@@ -60,6 +61,11 @@ class Scene:
         self.springs = [beside.uniform(0.05, 1), beside.uniform(0.05, 1)] if self.element != "hex8" and not ring and not self.group and beside.random() < 0.25 else None
         self.pull = [rng.uniform(-0.06, 0.06) for _ in range(2)] if self.element != "hex8" and not ring and rng.random() < 0.5 else None  # on its right side
         self.warm = rng.uniform(-0.1, 0.15) if rng.random() < 0.4 else 0.0
+        self.press = random.Random(f"leaning {number}").uniform(0.02, 0.15) if leaning else None
+        if leaning:
+            self.springs, self.aside = None, 0.2 * self.aside
+            for a, b in self.side["top"] if self.element == "quad8" else ():  # loaded sides are straight
+                self.nodes[self.middle(a, b)] = (self.nodes[a] + self.nodes[b]) / 2
 
     def bricks(self, rng, place):
         nx, ny, nz = rng.randint(1, 4), rng.randint(1, 3), rng.randint(1, 3)
@@ -84,8 +90,8 @@ class Scene:
         mesh = {"nodes": [[float(c) for c in node] for node in self.nodes], "elements": {self.element: self.cells.tolist()}, "groups": groups}
         top = {"ux": self.aside, **({"uz": 0} if dim == 3 else {})}
         problem = {"kind": "scene", "model": self.model, "kinematics": "finite", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": self.poisson, "law": self.law, "expansion": 0.5}],
-                   "supports": [{"on": "top", **top, "uy": -self.down}], "contacts": [{"on": "bottom", "obstacle": self.obstacle()}]}
-        problem["loads"] = ([{"on": "right", "traction": self.pull}] if self.pull else []) + ([{"on": "all", "temperature": 2 * self.warm}] if self.warm else [])
+                   "supports": [{"on": "top", **top, **({} if self.press else {"uy": -self.down})}], "contacts": [{"on": "bottom", "obstacle": self.obstacle()}]}
+        problem["loads"] = [{"on": side, "traction": force} for side, force in self.tractions()] + ([{"on": "all", "temperature": 2 * self.warm}] if self.warm else [])
         if self.springs:
             problem["supports"].append({"on": "right", "spring": self.springs})
         if self.group:
@@ -94,6 +100,9 @@ class Scene:
         self.held = {key: value for support in problem["supports"] for key, value in support.items() if key in keys}
         return {"problem": problem, **({"cases": [{"name": "way", "steps": self.steps}]} if self.steps else {})}
 
+    def tractions(self):
+        return [("right", self.pull)] * bool(self.pull) + [("top", [0, -self.press])] * bool(self.press)
+
     def left_over(self, found, part, checker):
         """What large/checker.c has to tell of an answer."""
         u, dim = numpy.array(found["displacements"]), self.nodes.shape[1]
@@ -101,7 +110,7 @@ class Scene:
         if self.element == "quad8":
             below, above = ({*on, *(self.middle(*side) for side in self.side[name])} for on, name in ((below, "bottom"), (above, "top")))
         held = [(n, "xyz".index(key[1]), value) for key, value in self.held.items() for n in sorted(above)]
-        sides = [(a, b, self.middle(a, b) if self.element == "quad8" else -1, *self.pull) for a, b in (self.side["right"] if self.pull else ())]
+        sides = [(a, b, self.middle(a, b) if self.element == "quad8" else -1, *force) for name, force in self.tractions() for a, b in self.side[name]]
         given = [self.element, self.model, self.law, self.poisson, part, self.warm, dim, len(self.nodes), len(self.cells), self.nodes, self.cells, u,
                  len(held), *held, len(below), sorted(below), len(sides), *sides]
         ground = [(a, b, self.middle(a, b) if self.element == "quad8" else -1) for a, b in self.side["right"]] if self.springs else []
@@ -181,11 +190,14 @@ def answers(s, request):
     return found.get("cases", [found]), ""
 
 
-def look(s, number, outcomes, checker):
-    """What is wrong with a scene's answers."""
-    scene = Scene(number)
+def look(s, number, outcomes, checker, leaning=False):
+    """What is wrong with a scene's answers; of one that leans on its obstacle it is right to say that the load does not press it on."""
+    scene = Scene(number, leaning)
     request, said = scene.request(), []
     cases, why = answers(s, request)
+    if cases is None and leaning and why.startswith("the loads "):
+        outcomes["refused"] = outcomes.get("refused", 0) + 1
+        return []
     if cases is None:
         return [why]
     for case, part in zip(cases, scene.steps or [1]):
@@ -209,8 +221,10 @@ def main():
     s, outcomes, false = service.Service(sys.argv[1]), {}, []
     try:
         s.start()
-        for number in range(int(sys.argv[3]) if len(sys.argv) > 3 else 500):
-            said = look(s, number, outcomes, pathlib.Path(sys.argv[1]) / "large-checker")
+        count = int(sys.argv[3]) if len(sys.argv) > 3 else 500
+        leaning = [number for number in range(count, 2 * count) if Scene(number).model == "plane_strain"]
+        for number in [*range(count), *leaning]:
+            said = look(s, number, outcomes, pathlib.Path(sys.argv[1]) / "large-checker", number >= count)
             if said:
                 false.append(number)
                 print(number, said, flush=True)
