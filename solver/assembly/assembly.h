@@ -72,6 +72,9 @@ typedef struct {
      * than one hold, `flank` says which; so many, the last ones, are inside sides. */
     int64_t n_flanks, *flank, n_inner;
     uz_inner_place *inner; /* n_inner */
+    /* Of a rigid obstacle in space, else NULL: by node of the group, is it a middle that has its own gap for a row, as
+     * the obstacle bows so much between the ends of its edge that a share of theirs would hold it afar? */
+    unsigned char *bows;
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
     /* The n_sides sides of both surfaces are of zones (mortar_pairs.c); rank: n_ranks pairs of a zone that is the slave
      * and one that is its master. of: n, of which surface a place's slave and most of its masters are: UZ_SLAVE_ON, ...

@@ -23,7 +23,7 @@ void uz_mesh_info_clear(uz_mesh_info *info)
 void uz_contact_sites_clear(uz_contact_sites *sites)
 {
     uz_free_all(sites->gap, sites->normal, sites->first, sites->node, sites->weight, sites->face, sites->at,
-                sites->area, sites->ends, sites->zone, sites->rank, sites->of, sites->inner, sites->flank);
+                sites->area, sites->ends, sites->zone, sites->rank, sites->of, sites->inner, sites->flank, sites->bows);
     *sites = (uz_contact_sites){.n = 0};
 }
 

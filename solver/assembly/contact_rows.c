@@ -5,8 +5,10 @@
  * not carry it. So the row of a middle between a and b is (g_i - s (g_a + g_b)) / (1 - 2 s), s = UZ_MIDDLE_SHARE: g as
  * the sum of transformed shape functions whose integrals are positive (see uz_side_positive_weights). What is linear
  * along the edge keeps its value, so that resultants and contact_pressure.c read a reaction as a force at its node. A
- * middle of which an end has no row keeps the row of its own gap. In a refined mesh an end may be such a middle itself,
- * of a larger face; g_a then is its gap, not its row. */
+ * middle of which an end has no row keeps the row of its own gap, and so does one between whose ends a rigid obstacle
+ * bows: where the face stays straight, its row would press from as far as s / (1 - 2 s) times what the ends' gaps are
+ * beyond its own, and where only it touches, its reaction would pull at ends that touch nothing. In a refined mesh an
+ * end may be such a middle itself, of a larger face; g_a then is its gap, not its row. */
 #include "assembly/discretization.h"
 #include "assembly/parts.h"
 
@@ -197,7 +199,8 @@ static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_
         }
         return;
     }
-    for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
+    const int64_t nodes = uz_group_node_count(&model->mesh, group);
+    for (int64_t i = 0; i < nodes; i++)
         row_of[uz_group_node_at(group, i)] = -1;
     for (int64_t row = first; row < end; row++) { /* several of a node that flanks of a groove hold */
         int64_t *head = &row_of[model->info.contact_node[row]];
@@ -213,6 +216,9 @@ static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_
         uz_mesh_face(node, &model->mesh, group->face[f]);
         for (int j = 0; j < 4; j++)
             for (int64_t row = row_of[node[4 + j]]; row >= 0; row = next[row]) {
+                const int64_t place = model->row_place[row];
+                if (sites->bows && place < nodes && sites->bows[place])
+                    continue;
                 const int64_t a = row_along(model, next, row_of[node[j]], row);
                 const int64_t b = row_along(model, next, row_of[node[(j + 1) % 4]], row);
                 if (a >= 0 && b >= 0) {

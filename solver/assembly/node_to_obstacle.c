@@ -42,6 +42,10 @@
 #define SINK  0.02
 /* Cosine of the angle between the way back and that out of the obstacle which is next there. */
 #define LEAST_BACK 0.5
+/* In lengths of an edge: how far from the obstacle its middle may be held by the gaps of its ends. */
+#define EARLY 0.02
+/* Of what the obstacle bows towards a middle: how far away it is then held while its edge is straight. */
+#define BOW_PRESSES (2 * UZ_MIDDLE_SHARE / (1 - 2 * UZ_MIDDLE_SHARE))
 /* The side is set back until it is so far from the obstacle. */
 #define CLEAR 0.1
 /* To rows the obstacle's edges are as if rounded with this part of the distance between nodes: of a node that settles
@@ -624,6 +628,39 @@ static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in,
     return UZ_OK;
 }
 
+/* Which middles of eight-node faces the obstacle bows towards (gaps: by node). It does so more where it is touched than
+ * at a distance d from there: of a circle of radius R it is l^2 / 8 (R + d) along an edge of length l. What was so
+ * before anything moved is kept, as rows that came and went with the place would leave Newton's method without an end.
+ */
+static uz_status find_bows(uz_contact_sites *sites, const uz_contact_input *in, const double *gaps, uz_error *err)
+{
+    const uz_mesh *mesh = &in->model->mesh;
+    const int64_t nodes = uz_places_of_nodes(in);
+    const unsigned char *before = in->rest ? in->rest->sites[in->index].bows : NULL;
+    unsigned char *by_node = uz_alloc_zero(mesh->n_nodes, 1);
+    sites->bows = uz_alloc_zero(nodes, 1);
+    if (!by_node || !sites->bows) {
+        free(by_node);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the gaps of %lld nodes", (long long)mesh->n_nodes);
+    }
+    for (int64_t f = 0; f < in->on->n_faces && !before; f++) {
+        int64_t node[UZ_FACE_NODES];
+        if (uz_mesh_face(node, mesh, in->on->face[f]) != 8)
+            continue;
+        for (int j = 0; j < 4; j++) {
+            const int64_t a = node[j], b = node[(j + 1) % 4], middle = node[4 + j];
+            const double length = sqrt(uz_distance2(mesh->xyz + 3 * a, mesh->xyz + 3 * b, 3));
+            const double bow = 0.5 * (gaps[a] + gaps[b]) - gaps[middle];
+            const double nearer = 1 - 8 * bow * fmax(0, gaps[middle]) / (length * length);
+            by_node[middle] = BOW_PRESSES * bow > EARLY * length * fmax(0, nearer);
+        }
+    }
+    for (int64_t i = 0; i < nodes; i++)
+        sites->bows[i] = before ? before[i] : by_node[uz_group_node_at(in->on, i)];
+    free(by_node);
+    return UZ_OK;
+}
+
 /* By node: sums of the normals of its sides (x dim), and the shortest distance to another node of them. */
 static void look_around(double *normals, double *near, const uz_contact_input *in)
 {
@@ -741,6 +778,8 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         sites->gap[i] = gaps[node] = first[i].gap.gap;
         uz_put_normal(sites, i, first[i].gap.normal, mesh->dim);
     }
+    if (status == UZ_OK && mesh->dim == 3)
+        status = find_bows(sites, in, gaps, err);
     if (status == UZ_OK)
         status = find_flanks(sites, in, obstacle, first, near, err);
     if (status == UZ_OK)

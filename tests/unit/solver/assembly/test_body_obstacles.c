@@ -150,3 +150,30 @@ TEST(a_disc_on_a_sphere)
     uz_result_free(r);
     uz_scene_clear(&s);
 }
+
+/* Before a ball that is small against a face of eight nodes the row of a middle with a share of its ends' gaps pressed
+ * from as far as a tenth of its edge. The ball is beside the middle of an edge, or was far from the face at rest. */
+TEST(a_ball_presses_only_what_it_touches)
+{
+    static const uz_kinematics KINDS[] = {UZ_KINEMATICS_FIXED, UZ_KINEMATICS_MOVING, UZ_KINEMATICS_FINITE};
+    for (int k = 0; k < 6; k++) {
+        const double way = k < 3 ? 0.02 : 3;
+        uz_scene s = body_scene(UZ_SOLID, "hex20", (double[3]){2, 2, 1}, (int64_t[3]){2, 2, 1});
+        s.materials[0].young = 100;
+        s.materials[0].law = k % 3 == 2 ? UZ_ELASTIC_NEO_HOOKE : UZ_ELASTIC_LINEAR;
+        s.kinematics = KINDS[k % 3];
+        body_hold(&s, "front", 0, 0, -way);
+        uz_contact *ball = body_plane(&s, "back", (double[3]){1, 0.5, -0.5 - way - 0.01}, (double[3]){0, 0, 1});
+        ball->kind = UZ_OBSTACLE_ROUND;
+        ball->radius = 0.5;
+        for (int touches = 0; touches < 2; touches++) {
+            uz_result *result = body_solve_to(&s, 1e-8);
+            const uz_summary *found = &result->summary;
+            CHECK_MSG(found->outcome == UZ_CONVERGED && (found->active > 0) == (touches == 1), "%d %d: %d, %lld rows",
+                      k, touches, found->outcome, (long long)found->active);
+            uz_result_free(result);
+            ball->point[2] += 0.02;
+        }
+        uz_scene_clear(&s);
+    }
+}
