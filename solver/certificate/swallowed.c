@@ -13,8 +13,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Rows leave a hundredth of a side, whose length is 2 in local coordinates, or 1. */
-#define DEEP 0.06
+/* How deep in an element a corner is in the body, in lengths of its edges: rows leave a hundredth of a side. Round
+ * obstacles are nowhere in it, be it between two elements, but for rounding. */
+#define DEEP   0.03
+#define AT_ALL (-1e-9)
 
 /* The middle of the obstacle, of a cylinder next to a place. */
 static void middle_of(double at[3], const uz_contact *contact, const double *near)
@@ -61,7 +63,7 @@ static void point_of(double at[3], const uz_contact *contact, int64_t i, const d
         at[(i - 1) / 2] += (i % 2 ? 0.5 : -0.5) * contact->radius;
 }
 
-static bool holds(const uz_element_type *type, const double *xyz, double extent, const double at[3])
+static bool holds(const uz_element_type *type, const double *xyz, double extent, const double at[3], double deep)
 {
     double point[3];
     for (int c = 0; c < type->dim; c++) {
@@ -74,7 +76,7 @@ static bool holds(const uz_element_type *type, const double *xyz, double extent,
         if (!(at[c] > low - room && at[c] < high + room))
             return false;
     }
-    return uz_element_find(point, type, xyz, extent, at) && uz_element_depth(type, point) > DEEP;
+    return uz_element_find(point, type, xyz, extent, at) && uz_element_depth(type, point) > deep;
 }
 
 /* An element of the displaced body. */
@@ -90,9 +92,11 @@ static bool looks_into(const uz_body_model *model, const uz_contact *contact, in
         xyz[i] = mesh->xyz[dim * node[i / dim] + i % dim] + u[dim * node[i / dim] + i % dim];
         centre[i % dim] += xyz[i] / count;
     }
+    const bool round = contact->kind == UZ_OBSTACLE_ROUND || contact->kind == UZ_OBSTACLE_CYLINDER;
+    const double edge = type->corners == 4 ? 2 : 1, deep = round ? AT_ALL : DEEP * edge;
     for (int64_t i = 0; i < count_points(contact, dim); i++) {
         point_of(at, contact, i, centre);
-        if (holds(type, xyz, mesh->extent, at))
+        if (holds(type, xyz, mesh->extent, at, deep))
             return true;
     }
     return false;

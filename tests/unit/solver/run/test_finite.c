@@ -770,6 +770,27 @@ TEST(no_obstacle_is_inside_of_a_converged_body)
     CHECK(refused > 5);
 }
 
+/* Balls of a thirtieth of a side: wholly in it, or beyond their middle and pulling; on the face between two elements.
+ */
+TEST(small_balls_are_inside_of_a_body_at_any_depth)
+{
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = body_scene(UZ_SOLID, k < 2 ? "tet10" : "hex8", (double[3]){3, 3, 1.5}, (int64_t[3]){2, 2, 1});
+        s.kinematics = UZ_KINEMATICS_FINITE;
+        s.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+        body_hold(&s, "front", 0, 0, -0.1);
+        const double radius = k == 0 ? 0.02 : 0.05, x = k < 2 ? 1.7 : 1.5, y = k < 2 ? 1.63 : 0.7;
+        uz_contact *ball = &s.contacts[s.n_contacts++];
+        *ball =
+            (uz_contact){.kind = UZ_OBSTACLE_ROUND, .on = "back", .point = {x, y, -0.02 - radius}, .radius = radius};
+        uz_result *r = solve(&s);
+        CHECK_MSG(r->summary.outcome == UZ_MESH_LIMIT && strstr(r->summary.message, "finer mesh") &&
+                      r->summary.finite.load > 0.2 && !(r->evaluation->contacts[0].force[2] < 0),
+                  "%d: %d, %g", k, r->summary.outcome, r->evaluation->contacts[0].force[2]);
+        give_back(r, &s);
+    }
+}
+
 /* Of strains of 5e-9 as of others. */
 TEST(small_strains_have_their_part_of_the_mesh)
 {
