@@ -103,10 +103,14 @@ bool uz_bound_blames_distance(const uz_certificate *out, double square, double r
  * left is no rounding, so that what is small beside the motion, but not beside the strains, is not taken for it. */
 #define RIGID    1e-10
 #define ROUNDING 1e-12
+/* Less than what places of nodes are rounded by presses on nobody. */
+#define TOUCHING (8 * DBL_EPSILON)
 
-double uz_bound_reference(double whole_norm, double free_norm, double error, bool loaded)
+double uz_bound_reference(double whole_norm, double free_norm, double error, uz_acting acting)
 {
-    const bool rigid = !loaded && whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm;
+    const bool apart = acting == UZ_ACTING_NOTHING ||
+                       (acting == UZ_ACTING_ROWS && whole_norm + error <= TOUCHING * free_norm),
+               rigid = apart && whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm;
     return rigid ? free_norm : whole_norm;
 }
 
@@ -170,7 +174,7 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     if (t->anything)
         out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);
     if (t->moved)
-        out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error, t->loaded);
+        out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error, t->acting);
     /* over ||u*||_K, which is at least ||v||_K minus the error */
     const double least = out->energy_norm - out->absolute_error;
     out->relative_error = out->absolute_error == 0.0               ? 0.0

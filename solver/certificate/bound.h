@@ -4,6 +4,13 @@
 
 #include "uzawa.h"
 
+/* What acts on a body beside its supports. */
+typedef enum {
+    UZ_ACTING_NOTHING,
+    UZ_ACTING_ROWS, /* they touch it, and may press, if only by what rounding hides */
+    UZ_ACTING_LOADS /* they deform it, whether or not that is seen */
+} uz_acting;
+
 typedef struct {
     double stiffness;         /* u'Ku */
     double energy, margin;    /* pi(u), and what rounding may hide of pi(v) */
@@ -15,7 +22,8 @@ typedef struct {
     double complementarity;   /* -r'g(v + delta) */
     double settled, pressed;  /* ||delta||_K, -r'|g(v)|: it is v + delta that is feasible; 0 where delta is 0 */
     double positive_part;     /* of the reactions that were given */
-    bool moved, loaded;       /* supports move the body, and loads deform it: */
+    bool moved;               /* supports move the body: */
+    uz_acting acting;         /* what else acts on it, and */
     double whole_norm;        /* ||u||_K with the supported dofs */
     bool anything;            /* some entry of u, c or K u - p - N'r is not zero */
 } uz_bound_terms;
@@ -63,8 +71,9 @@ double uz_bound_rounding(const uz_energy_sums *s, int64_t d);
 /* What an error is relative to where supports move the body. u'Ku over the free dofs counts that motion as if it tore
  * the body off its supports: an error relative to free_norm says nothing of strain and reactions. So it is whole_norm,
  * of which rigid motions are no part; but for a body that nothing but its supports moves, and that is surely not
- * deformed beyond the rounding of its motion. One that is loaded is deformed, whether or not that is seen. */
-double uz_bound_reference(double whole_norm, double free_norm, double error, bool loaded);
+ * deformed beyond the rounding of its motion. One that is loaded is deformed, whether or not that is seen; one that
+ * rows may press, unless the bound on how much, whole_norm + error, is about that rounding itself. */
+double uz_bound_reference(double whole_norm, double free_norm, double error, uz_acting acting);
 
 /* 2-norm without overflow. */
 double uz_bound_norm(const double *x, int64_t n);

@@ -250,7 +250,7 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     uz_bound_terms terms = {.square = INFINITY,
                             .positive_part = positive_part,
                             .moved = c->in->moved,
-                            .loaded = c->in->loaded,
+                            .acting = c->in->acting,
                             .whole_norm = c->in->whole_norm};
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)

@@ -46,7 +46,7 @@ typedef struct {
     double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm: half
                              of what is asked for. Where that is too much after all, nothing is spared */
     bool moved;           /* supports move the body; relative errors are then beside */
-    bool loaded;          /* loads deform it, too */
+    uz_acting acting;     /* what else acts on it then */
     double whole_norm;    /* ||u||_K with the supported dofs */
 } uz_certify_input;
 

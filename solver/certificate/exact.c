@@ -209,7 +209,7 @@ static void conclude(exact *c, uz_certificate *better, const mpf_t square)
     better->energy_dual = outward(term, -1.0);
     if (c->in->moved) {
         mpf_set_d(term,
-                  uz_bound_reference(c->in->whole_norm, better->energy_norm, better->absolute_error, c->in->loaded));
+                  uz_bound_reference(c->in->whole_norm, better->energy_norm, better->absolute_error, c->in->acting));
     } else {
         mpf_set_q(term, c->norm);
         mpf_sqrt(term, term);

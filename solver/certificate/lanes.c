@@ -321,7 +321,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     in.ctx = &solve;
     in.sharp = a->sharp;
     in.moved = a->moved;
-    in.loaded = a->loaded;
+    in.acting = a->acting;
     in.whole_norm = a->whole_norm;
     energies->load = s->load[l];
     energies->load_low = s->load_low[l];
@@ -339,7 +339,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
                             NULL) != UZ_OK)
         return;
     terms->moved = a->moved;
-    terms->loaded = a->loaded;
+    terms->acting = a->acting;
     terms->whole_norm = a->whole_norm;
     terms->stiffness = s->stiffness[l];
     terms->change = s->change[l];

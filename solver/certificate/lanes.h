@@ -26,7 +26,7 @@ typedef struct {
     const double *h; /* m */
     double sharp;    /* see uz_certify_input */
     bool moved;      /* the same */
-    bool loaded;
+    uz_acting acting;
     double whole_norm;
     uz_certificate certificate;
     bool certified; /* false: certificate is not filled */

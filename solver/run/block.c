@@ -164,8 +164,7 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
                                       .h = runs[k].load.h,
                                       .sharp = 0.5 * runs[k].work.requested,
                                       .moved = load->moved,
-                                      .loaded = load->loaded ||
-                                                (load->moved && uz_may_press(block->N, load->h, runs[k].answer.u)),
+                                      .acting = uz_run_acting(&runs[k], block->N, load->h, runs[k].answer.u),
                                       .whole_norm = whole_norm};
     }
     if (status != UZ_OK)

@@ -39,6 +39,9 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
     return status;
 }
 
+/* Stiffnesses that differ by no more: their roots are in energy norms. */
+#define ALIKE 100
+
 /* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. Without a factor it is the operator's affair. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
@@ -59,6 +62,29 @@ static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
     const uz_request *asked = run->asked;
     const uz_stop stop = {asked->hooks, asked->deadline};
     return uz_setup_doubt(asked->setup, doubt, uz_setup_K(asked->setup, asked->problem), &stop, err);
+}
+
+/* Are all elements about as stiff, and is nothing as soft as a spring? Else what one of them is pressed by would be
+ * rounding beside the motion of the others. */
+static bool is_alike(const uz_body_model *model)
+{
+    double least = INFINITY, most = 0;
+    for (int64_t k = 0; k < model->n_materials; k++) {
+        const double stiffness = uz_most_stiffness(model->materials[k].lame);
+        least = fmin(least, stiffness);
+        most = fmax(most, stiffness);
+    }
+    return !model->spring && most <= ALIKE * least;
+}
+
+uz_acting uz_run_acting(const uz_run *run, const uz_csc *N, const double *h, const double *u)
+{
+    const uz_load_vectors *load = &run->load;
+    if (load->loaded)
+        return UZ_ACTING_LOADS;
+    if (!load->moved || !uz_may_press(N, h, u))
+        return UZ_ACTING_NOTHING;
+    return is_alike(&run->asked->setup->model) ? UZ_ACTING_ROWS : UZ_ACTING_LOADS;
 }
 
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err)
@@ -95,7 +121,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .inverse_bound = setup->factor ? uz_factor_describe(setup->factor).inverse_bound : INFINITY,
         .spares = setup->factor && uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES,
         .moved = run->load.moved,
-        .loaded = run->load.loaded || (run->load.moved && uz_may_press(N, h, answer->u)),
+        .acting = uz_run_acting(run, N, h, answer->u),
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->work.requested,
     };

@@ -119,6 +119,8 @@ const uz_hooks *uz_run_hooks(uz_scaled_hooks *room, const uz_run *run);
 
 /* ---- certificates (certify.c) */
 
+/* What acts on the body beside its supports, at an answer u (d) to rows N, h. */
+uz_acting uz_run_acting(const uz_run *run, const uz_csc *N, const double *h, const double *u);
 /* What a certificate of the answer's u and rows starts from; needs the load. */
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err);
 /* Fills answer->certificate and answer->g from answer->u and answer->r (caller's rows), from the original data. */

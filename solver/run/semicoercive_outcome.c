@@ -36,7 +36,8 @@ uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, doubl
     /* of matrices what a fall leaves by rounding can't be told from strain */
     uz_status status = uz_whole_norm(&whole, &s->model, u, s->prescribed, err);
     const bool moved = status == UZ_OK && uz_is_moved(&s->model, s->prescribed);
-    *norm = moved ? uz_bound_reference(whole, *norm, error, uz_is_loaded(&s->model, &s->problem->scene)) : whole;
+    const bool loaded = moved && uz_is_loaded(&s->model, &s->problem->scene);
+    *norm = moved ? uz_bound_reference(whole, *norm, error, loaded ? UZ_ACTING_LOADS : UZ_ACTING_NOTHING) : whole;
     return status;
 }
 

@@ -416,4 +416,22 @@ def test_refusals_name_the_place(s):
             "/contacts/1", "with")
 
 
+def test_bodies_that_come_to_touch_press_with_nothing(s):
+    """A block is put on another one, or carried on along it: what rounding deforms both by is no deformation. Where it is
+    pressed by a billionth of its way it is one, and the force that of the same scene from nearby."""
+    def put(gap, aside, deeper, kinematics):
+        return body(["quad4", "quad4"], [(4, 2), (5, 2)], [lambda x, y: (2 * x, y), lambda x, y: (2 * x, 1 + gap + y)],
+                    {"low": [(0, "top")], "high": [(1, "bottom")], "foot": [(0, "bottom")], "lid": [(1, "top")]},
+                    model="plane_strain", materials=[{"on": "all", "young": 100, "poisson": 0.3}], kinematics=kinematics,
+                    supports=[{"on": "foot", "ux": 0, "uy": 0}, {"on": "lid", "ux": aside, "uy": -gap - deeper}],
+                    contacts=[{"on": "high", "with": "low"}])
+
+    for (gap, aside), kinematics in itertools.product(((0.1, 0), (0.1, 0.1), (0, 0.3)), ("small", "auto")):
+        summary = s.solved(put(gap, aside, 0, kinematics), "converged")["summary"]
+        check(math.hypot(*summary["contact"]["force"]) < 1e-13 and summary["certificate"]["relative_error"] < 1e-12, summary)
+    far, near = (s.solved(put(gap, 0, 1e-9, "small"))["summary"] for gap in (0.125, 0))
+    check(near["outcome"] == "converged" and abs(far["contact"]["force"][1] / near["contact"]["force"][1] - 1) < 1e-5,
+          far["contact"]["force"], near["contact"]["force"])
+
+
 service.main(globals())

@@ -20,7 +20,8 @@ static inline void take_whole_norm(truth *known, const uz_body_model *model, con
         for (int64_t j = 0; j < model->d; j++)
             u[j] = (double)known->best.u[j];
         if (uz_whole_norm(&norm, model, u, prescribed, NULL) == UZ_OK)
-            known->norm = uz_bound_reference(norm, (double)known->norm, 0, uz_is_loaded(model, scene));
+            known->norm = uz_bound_reference(norm, (double)known->norm, 0,
+                                             uz_is_loaded(model, scene) ? UZ_ACTING_LOADS : UZ_ACTING_NOTHING);
     }
     free(p);
 }
