@@ -482,15 +482,14 @@ static uz_status look_at_contact(const doubts *d, const uz_coarse_contact *coars
     }
     if (coarse->contact >= 0 && coarse->depth > 0)
         warn(d->out, UZ_WARN_COARSE, (double)coarse->sides,
-             "the obstacle of contact %lld stands %.3g deep in %lld sides between their nodes, as at node %lld, and "
-             "meets no resistance there; use finer sides, or rows inside them",
+             "the obstacle of contact %lld stands %.3g deep in %lld sides between nodes, as at %lld, and meets no "
+             "resistance there; use finer sides, or rows inside",
              (long long)coarse->contact, coarse->depth, (long long)coarse->sides, (long long)coarse->node);
     else if (coarse->contact >= 0)
-        warn(
-            d->out, UZ_WARN_COARSE, (double)coarse->sides,
-            "%.0f %% of the force of contact %lld are carried where it is narrower than three sides (%lld sides touch, "
-            "as at node %lld): force and pressure there depend on the mesh; refine it there",
-            100 * coarse->part, (long long)coarse->contact, (long long)coarse->sides, (long long)coarse->node);
+        warn(d->out, UZ_WARN_COARSE, (double)coarse->sides,
+             "%.0f %% of the force of contact %lld act where it is narrower than three sides (%lld touch, as at node "
+             "%lld): pressure depends on the mesh there; refine it",
+             100 * coarse->part, (long long)coarse->contact, (long long)coarse->sides, (long long)coarse->node);
     if (behind >= 0)
         warn(d->out, "obstacle_behind", away,
              "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "

@@ -171,6 +171,12 @@ TEST(a_ball_presses_only_what_it_touches)
             const uz_summary *found = &result->summary;
             CHECK_MSG(found->outcome == UZ_CONVERGED && (found->active > 0) == (touches == 1), "%d %d: %d, %lld rows",
                       k, touches, found->outcome, (long long)found->active);
+            for (int i = 0; i < result->evaluation->n_warnings; i++) {
+                const char *text = result->evaluation->warnings[i].message; /* whole, with what to do at its end */
+                CHECK_MSG(strcmp(result->evaluation->warnings[i].code, "coarse_contact") != 0 ||
+                              strcmp(text + strlen(text) - strlen("refine it"), "refine it") == 0,
+                          "%s", text);
+            }
             uz_result_free(result);
             ball->point[2] += 0.02;
         }
