@@ -55,7 +55,8 @@ typedef struct {
     double base_slack; /* of base = K^-1 p, */
     double base_aim;   /* and what it was solved for; INFINITY: not at all, it is 0 */
     double held_slack; /* of known_u, while it is there */
-    bool unmeasured;   /* and while nobody has asked for it: its guess was seen to be wrong on the way */
+    bool unmeasured;   /* and while nobody has asked for it: its guess was seen to be wrong on the way, or pulls */
+    bool cut;          /* known_r is without what pulled: known_u is the answer for it, but not to begin at */
     int refused;       /* guesses that were left to steps of the active set */
     bool asked;        /* for D r, before */
     bool near;         /* box->u and box->r are near the answer, and nobody has begun there yet */
@@ -206,37 +207,49 @@ static uz_status measure_slack(free_load *x, const double *e, uz_error *err)
     return status;
 }
 
-/* The same of bounds: e is the forces on free dofs, and on held ones what no row bears. */
-static uz_status measure_held(free_load *x, uz_error *err)
+/* The same of bounds and r (m), which becomes theirs: e is the forces on free dofs, and on held ones what r does not
+ * bear. */
+static uz_status measure_held(free_load *x, const double *r, uz_error *err)
 {
-    const uz_bounded *box = x->sparse.box;
+    uz_bounded *box = x->sparse.box;
     const uz_bounds *bounds = box->bounds;
     const int64_t m = x->sparse.load.dual->m;
     double *e = x->cg.r;
     x->unmeasured = false;
-    if (!may_bound(x, box->r))
-        return UZ_OK;
+    for (int64_t i = 0; i < m; i++) {
+        x->cut = x->cut || r[i] != box->r[i];
+        box->r[i] = r[i];
+    }
     uz_long_copy(x->cg.n, e, box->force);
     for (int64_t i = 0; i < m; i++)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     return measure_slack(x, e, err);
 }
 
-/* Without a solve: r is 0, or the answer of the last guess of the active rows, whose displacement is there. */
+/* Is r the answer of the last guess of the active rows? While that is unmeasured, be it without what pulls. */
+static bool is_guessed(const free_load *x, const double *r)
+{
+    const double *known = x->sparse.known_r;
+    bool guessed = !x->probing && x->sparse.known_u && !x->cut;
+    for (int64_t i = 0; i < x->sparse.load.dual->m && guessed; i++)
+        guessed = r[i] == known[i] || (x->unmeasured && r[i] == 0.0 && uz_reaction_pulls(known[i]));
+    return guessed;
+}
+
+/* Without a solve: r is 0, or that answer, whose displacement is there. */
 static bool apply_known(free_load *x, double *Dr, const double *r, uz_status *status, uz_error *err)
 {
     uz_dual_load *load = &x->sparse.load;
     const double *u = x->sparse.known_u;
     const int64_t d = load->dual->d, m = load->dual->m;
-    bool zero = !x->probing, guessed = !x->probing && u;
-    for (int64_t i = 0; i < m && (zero || guessed); i++) {
-        zero = zero && r[i] == 0.0;
-        guessed = guessed && r[i] == x->sparse.known_r[i];
-    }
+    const bool guessed = is_guessed(x, r);
+    bool zero = !x->probing;
+    for (int64_t i = 0; i < m && zero; i++)
+        zero = r[i] == 0.0;
     if (!zero && !guessed)
         return false;
     if (guessed && x->unmeasured)
-        *status = measure_held(x, err);
+        *status = measure_held(x, r, err);
     for (int64_t j = 0; j < d; j++)
         x->sparse.response[j] = guessed ? u[j] - x->sparse.base[j] : 0.0;
     memset(Dr, 0, (size_t)m * sizeof *Dr);
@@ -254,7 +267,9 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     for (int64_t i = 0; i < dual->m && begins; i++)
         begins = r[i] == 0.0;
     x->asked = true;
-    uz_status status = isinf(x->base_aim) && !begins ? solve_base(x, BASE_ROUGH, err) : UZ_OK;
+    /* a guess that is to be bounded at an end has its displacement, and there may be no time for another */
+    const bool needless = begins || (x->unmeasured && is_guessed(x, r));
+    uz_status status = isinf(x->base_aim) && !needless ? solve_base(x, BASE_ROUGH, err) : UZ_OK;
     if (status != UZ_OK || apply_known(x, Dr, r, &status, err))
         return status;
     const bool bounds = x->sparse.box != NULL;
@@ -593,10 +608,10 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     status = status == UZ_OK ? freed : status;
     if (status != UZ_OK)
         return status;
-    x->unmeasured = ended; /* the next guess is as near, and is bounded in its place */
-    x->sparse.slack = x->held_slack = INFINITY;
-    if (!ended)
-        status = measure_held(x, err);
+    x->cut = false;
+    x->unmeasured = !may_bound(x, box->r) || ended; /* the next guess is as near, and is bounded in its place */
+    if (!x->unmeasured)
+        status = measure_held(x, box->r, err);
     /* psi(r) by u where no base tells it: -u'K u / 2 + r'h, u'K u = u'p + r'(h - g) */
     if (isinf(x->base_aim))
         load->psi0 =

@@ -196,11 +196,11 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
     return status;
 }
 
-/* Whoever goes on begins at what is bounded: where operators leave guesses unbounded that are seen to be wrong, it is
- * the last one. */
-static uz_status bound_last(uz_iterate *it, const double *r, uz_dual_load *load, uz_error *err)
+/* The answer, or where whoever goes on begins, is what is bounded: operators leave guesses unbounded that are seen to
+ * be wrong on the way or pull, of which the last one is at an end, without what pulls. */
+static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    if (!isinf(it->best_bound) || !it->law->kind->admissible(it->law, r, it->m))
+    if (load->dual->can->exact || (isfinite(it->best_bound) && it->best_iteration == it->iteration))
         return UZ_OK;
     const uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
     if (status != UZ_OK) /* also where there is no time for it */
@@ -282,8 +282,8 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
     else if (may_exchange(it, load))
         status = solve_by_exchange(&p, end, it, load, options, history, err);
 done:
-    if (status == UZ_OK && p.before > 0)
-        status = bound_last(it, p.r, load, err);
+    if (status == UZ_OK && p.before > 0 && !over && *end != UZ_END_SOLVED && *end != UZ_END_TARGET)
+        status = bound_last(it, load, err);
     void *room[] = {p.active, p.held, p.refuted, p.r, p.g};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);

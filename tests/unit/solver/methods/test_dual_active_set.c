@@ -159,6 +159,40 @@ TEST(slender_solids_take_few_solves)
     uz_problem_clear(&problem);
 }
 
+/* Guesses that are seen to be wrong, or whose rows pull, are not bounded while others come: where none may come any
+ * more, the last one is, by each step nearer. */
+TEST(a_limit_ends_with_the_last_guess)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(40, 3, 40, 3)};
+    uz_scene *scene = &problem.scene;
+    uz_settings settings = uz_settings_default();
+    scene->model = UZ_SOLID;
+    scene->box.dim = 3;
+    scene->box.size[2] = 6;
+    scene->box.cells[2] = 6;
+    snprintf(scene->box.element, sizeof scene->box.element, "hex8");
+    scene->materials[0].young = 1000;
+    scene->materials[0].poisson = 0.3;
+    add_support(scene, "left", 0, 0);
+    scene->supports[0].u[2] = 0;
+    add_load(scene, "top", 0, -0.02);
+    add_load(scene, "right", 0.1, 0.01);
+    add_plane(scene, "bottom", 0, 0, 0, 1);
+    settings.op = UZ_OPERATOR_MATRIX_FREE;
+    for (int64_t limit = 1; limit <= 2; limit++) {
+        settings.max_iterations = limit;
+        uz_result *result = solve_problem(&problem, &settings);
+        if (result) {
+            const uz_summary *s = &result->summary;
+            CHECK_INT(s->outcome, UZ_ITERATION_LIMIT);
+            CHECK_MSG(s->certificate.relative_error < 2 * pow(0.1, (double)limit - 1), "%lld: %g", (long long)limit,
+                      s->certificate.relative_error);
+        }
+        uz_result_free(result);
+    }
+    uz_problem_clear(&problem);
+}
+
 /* Nearly all rows touch: they come off one by one. Few do: they come to touch one by one. */
 TEST(steps_are_those_of_the_shorter_way)
 {
