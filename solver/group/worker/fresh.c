@@ -3,6 +3,8 @@
  * rows of all: what it waits for, all wait for. */
 #include "worker.h"
 
+#include "core/alloc.h"
+
 #include <limits.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -30,7 +32,9 @@ void fresh_begin(fresh_pages *fresh, int64_t bytes)
     bytes = bytes < MOST ? bytes : MOST;
     if (bytes < (int64_t)HUGE_PAGE)
         return;
-    char *block = new_room(bytes, 1);
+    char *block = uz_alloc(bytes, 1);
+    if (!block) /* as many as there will be, about: who needs them says so */
+        return;
     fresh->at = block + (SMALL_PAGE - (uintptr_t)block % SMALL_PAGE) % SMALL_PAGE;
     fresh->bytes = (size_t)(bytes - (fresh->at - block)) / SMALL_PAGE * SMALL_PAGE;
     free(block);
