@@ -527,7 +527,7 @@ uz_status uz_solve_finite_load(uz_result **out, const uz_problem *one, const uz_
         status = taken == UZ_OK ? status : taken;
     }
     if (status == UZ_OK && small)
-        (*out)->summary.small = uz_finite_compare(&run, *out, small);
+        status = uz_finite_compare(&(*out)->summary.small, &run, *out, small, err);
     end(&run);
     return status;
 }

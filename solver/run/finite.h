@@ -259,7 +259,8 @@ const char *uz_explain_stop(uz_outcome stopped);
 /* What a run holds, beside the largest of what its contact problems and its certificates take. rows: a body moved to a
  * place, NULL: not there yet. */
 double uz_finite_bytes(const uz_body_model *base, const uz_body_model *rows, bool pairs);
-/* How far the answer `small` is off from *result, that of run (uz_small); its warning large_strain gets to know. */
-uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small);
+/* How far the answer `small` is off from *result, that of run; its warning large_strain gets to know. UZ_ERR_MEMORY. */
+uz_status uz_finite_compare(uz_small *out, const uz_finite_run *run, const uz_result *result, const uz_result *small,
+                            uz_error *err);
 
 #endif

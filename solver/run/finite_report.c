@@ -286,17 +286,65 @@ static void compare_forces(double *off, double *most, const uz_resultant *here, 
     }
 }
 
-/* Displacements by their mean squares, without what carries the body as a whole. */
-static double compare_displacements(const double *here, const double *small, int64_t n, int dim)
+/* Takes what v has of q (n, of norm 1) off it; returns how much that was. */
+static double take_off(double *v, const double *q, int64_t n)
 {
-    double mean[3] = {0}, off = 0, all = 0;
+    double along = 0;
     for (int64_t i = 0; i < n; i++)
-        mean[i % dim] += here[i] * dim / (double)n;
-    for (int64_t i = 0; i < n; i++) {
-        off += (here[i] - small[i]) * (here[i] - small[i]);
-        all += (here[i] - mean[i % dim]) * (here[i] - mean[i % dim]);
+        along += v[i] * q[i];
+    for (int64_t i = 0; i < n; i++)
+        v[i] -= along * q[i];
+    return along;
+}
+
+/* The motions that supports leave free, by node, become orthonormal: n_modes x n. */
+static void find_motions(double *motion, const uz_finite_run *run)
+{
+    const uz_body_model *model = &run->base;
+    const int64_t n = run->n;
+    for (int64_t k = 0; k < model->n_modes; k++) {
+        double *own = motion + k * n, square = 0;
+        uz_recover_nodal(own, model, model->modes + k * model->d, NULL);
+        for (int64_t q = 0; q < 2 * k; q++) /* twice is enough */
+            take_off(own, motion + q % k * n, n);
+        for (int64_t i = 0; i < n; i++)
+            square += own[i] * own[i];
+        for (int64_t i = 0; i < n && square > 0; i++)
+            own[i] /= sqrt(square);
     }
-    return all > 0 ? sqrt(off / all) : off > 0 ? (double)INFINITY : 0;
+}
+
+/* Displacements by their mean squares, without what carries the body as a whole. Where contact alone sets a motion, by
+ * as little as one node, that is no part of what deforms, and is held against all displacements. */
+static uz_status compare_displacements(double *error, const uz_finite_run *run, const double *here, const double *small,
+                                       uz_error *err)
+{
+    const int64_t n = run->n, modes = run->base.n_modes;
+    const int dim = run->base.mesh.dim;
+    double mean[3] = {0}, off = 0, all = 0, off_motion = 0, motions = 0;
+    double *apart = uz_alloc(n, sizeof *apart), *whole = uz_alloc(n, sizeof *whole),
+           *motion = uz_alloc(modes * n, sizeof *motion);
+    const bool room = apart && whole && motion;
+    if (room)
+        find_motions(motion, run);
+    for (int64_t i = 0; i < n && room; i++) {
+        apart[i] = here[i] - small[i];
+        whole[i] = here[i];
+    }
+    for (int64_t k = 0; k < modes && room; k++) {
+        off_motion = hypot(off_motion, take_off(apart, motion + k * n, n));
+        motions = hypot(motions, take_off(whole, motion + k * n, n));
+    }
+    for (int64_t i = 0; i < n && room; i++)
+        mean[i % dim] += whole[i] * dim / (double)n;
+    for (int64_t i = 0; i < n && room; i++) {
+        off += apart[i] * apart[i];
+        all += (whole[i] - mean[i % dim]) * (whole[i] - mean[i % dim]);
+    }
+    *error = all > 0 ? fmax(sqrt(off / all), off_motion / hypot(motions, sqrt(all))) : off > 0 ? (double)INFINITY : 0;
+    uz_free_all(apart, whole, motion);
+    return room ? UZ_OK
+                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for displacements of %lld nodes", (long long)(n / dim));
 }
 
 static void take_greater(uz_small *out, double error, const char *in)
@@ -307,26 +355,27 @@ static void take_greater(uz_small *out, double error, const char *in)
     }
 }
 
-uz_small uz_finite_compare(const uz_finite_run *run, const uz_result *result, const uz_result *small)
+uz_status uz_finite_compare(uz_small *out, const uz_finite_run *run, const uz_result *result, const uz_result *small,
+                            uz_error *err)
 {
     const uz_evaluation *here = result->evaluation, *there = small->evaluation;
     const uz_finite *told = &result->summary.finite;
     const double energy = run->at.body.energy;
     double off = 0, most = 0;
-    uz_small out = {.compared = true, .error = INFINITY, .in = "displacements", .load = run->found.load};
+    *out = (uz_small){.compared = true, .error = INFINITY, .in = "displacements", .load = run->found.load};
     if (run->found.load < 1)
-        return out;
-    out.error = compare_displacements(result->u, small->u, run->n, run->base.mesh.dim);
-    if (energy <= 10 * run->grain) /* forces and energy are rounding, too */
-        return out;
+        return UZ_OK;
+    const uz_status status = compare_displacements(&out->error, run, result->u, small->u, err);
+    if (status != UZ_OK || energy <= 10 * run->grain) /* forces and energy are rounding, too */
+        return status;
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
     compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
     most = fmax(most, UZ_LEAST_FORCE * here->loads_size); /* of loads that hold each other supports have rounding */
     if (told->displacement > 0)
         most = fmax(most, fmax(LEAST_OF_ENERGY, told->residual) * energy / told->displacement);
     if (most > 0)
-        take_greater(&out, off / most, "forces");
-    take_greater(&out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
-    uz_doubt_strain(small->evaluation, &out, &run->base, &run->scene, small->u, run->at.u);
-    return out;
+        take_greater(out, off / most, "forces");
+    take_greater(out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
+    uz_doubt_strain(small->evaluation, out, &run->base, &run->scene, small->u, run->at.u);
+    return UZ_OK;
 }

@@ -122,6 +122,7 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
     const uz_status status = uz_solve_finite_load(&large, &by_law, &coarse, hooks, deadline, result, NULL, &own);
     free(by_law.scene.materials);
     if (status == UZ_ERR_MEMORY || status == UZ_ERR_CANCELLED) { /* what is left is an answer */
+        uz_result_free(large);
         uz_doubt_uncompared(result->evaluation, status == UZ_ERR_MEMORY ? "memory" : "time");
         return UZ_OK;
     }

@@ -193,5 +193,21 @@ def test_auto_goes_on_by_itself(s):
     check("large_deformation" in [one["code"] for one in linear["warnings"]] and linear["semicoercive"]["free_modes"] == 1, linear)
 
 
+def test_what_one_node_sets_is_no_deformation(s):
+    """How far a disc comes down until its lowest node holds it is as much as ten times what its other nodes move to each other by."""
+    few, some = (answer(s, half_disc(weight, "linear", kinematics="auto"))["summary"] for weight in (0.001, 0.01))
+    large = answer(s, half_disc(0.001, "st_venant_kirchhoff"))
+    small = answer(s, half_disc(0.001, "linear", kinematics="small"))
+    apart = [[a - b for a, b in zip(u, v)] for u, v in zip(large["displacements"], small["displacements"])]
+    n, down, off = len(apart), *(sum(u[1] for u in one) / len(apart) for one in (large["displacements"], apart))
+    along = sum(u[0] for u in large["displacements"]) / n
+    deformed = math.sqrt(sum((u - along) ** 2 + (v - down) ** 2 for u, v in large["displacements"]))
+    shape = math.sqrt(sum(u ** 2 + (v - off) ** 2 for u, v in apart)) / deformed
+    error = max(shape, abs(off) / math.hypot(down, deformed / math.sqrt(n)))
+    check(abs(few["small_deformation"]["error"] / error - 1) < 1e-6 and 0.01 < error < 0.03, error, few["small_deformation"])
+    check([["large_deformation" in [one["code"] for one in found["warnings"]], found["small_deformation"]["error"] > 0.05]
+           for found in (few, some)] == [[False, False], [True, True]], few, some)
+
+
 if __name__ == "__main__":
     service.main(globals())
