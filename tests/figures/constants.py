@@ -87,6 +87,7 @@ PHRASES = {
     "end without a certified equilibrium in 20 steps": constant(20, r"MOST_QPS = (\d+)"),
     "large deformation where that is more than 5 %;": None, "(`small_deformation`), beyond 0.05.": None, "`small_deformation` is beyond 0.05.": None, "Where that is more than 5 %": None,  # UZ_MOST_SLIDING
     "by up to 20,000 dofs.": constant(20000, r"UZ_MOST_COMPARED = (\d+)"), "Up to 0.02 the answer stays:": constant(0.02, r"#define UZ_SURELY_SMALL ([\d.]+)"),
+    "So where that is more than 2 % of the edge before": constant(0.02, r"#define EARLY +([\d.]+)"), "from about R < 4.2 edges on": None,  # 1 / (12 EARLY)
     "solids of up to 20,000 dofs, in all": constant(20000, r"UZ_MOST_FINITE_DOFS (\d+)"), "for which solids have at most 20,000 dofs.": constant(20000, r"UZ_MOST_FINITE_DOFS (\d+)"),
     "counts 10 and 5 times, the rest 2.4 and 1.5 times": lambda program: all(one in program.sources for one in ("plane ? 2.4 : 7", "plane ? 10 : 7", "plane ? 1.5 : 3", "plane ? 5 : 3")),
     "of 1,200 generated scenes in plane strain 182 did, and were off by at most 2.6 %": None,  # test_weigh with 300 scenes
