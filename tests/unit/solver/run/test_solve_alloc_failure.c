@@ -170,6 +170,20 @@ static uz_problem weighed_problem(uz_elasticity law)
     return problem;
 }
 
+/* A block that its load alone presses on a plane, by either model. */
+static uz_problem pressed_on_problem(uz_kinematics kinematics)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(1, 1, 2, 2)};
+    add_support(&problem.scene, "left", 0, NAN);
+    add_plane(&problem.scene, "bottom", 0, 0, 0, 1);
+    add_load(&problem.scene, "top", 0, -0.1 * problem.scene.materials[0].young);
+    problem.scene.model = UZ_PLANE_STRAIN;
+    problem.scene.kinematics = kinematics;
+    if (kinematics == UZ_KINEMATICS_FINITE)
+        problem.scene.materials[0].law = UZ_ELASTIC_NEO_HOOKE;
+    return problem;
+}
+
 /* The same scene for some of its numbers. */
 static uz_problem asking_problem(void)
 {
@@ -326,6 +340,10 @@ TEST(small_deformation_is_compared)
                    false);
     check_scenario("law of finite strain", weighed_problem(UZ_ELASTIC_NEO_HOOKE), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO,
                    UZ_ORDERING_AUTO, false);
+    check_scenario("held by contact alone", pressed_on_problem(UZ_KINEMATICS_AUTO), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO,
+                   UZ_ORDERING_AUTO, false);
+    check_scenario("held by contact alone at finite strain", pressed_on_problem(UZ_KINEMATICS_FINITE), UZ_METHOD_AUTO,
+                   UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
 }
 
 /* The answer stays, whatever the bound on its whole error lacks. */
