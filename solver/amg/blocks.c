@@ -427,7 +427,7 @@ static inline __attribute__((always_inline)) void multiply(const product *p, int
         for (int l = 0; l < lanes; l++) {
             mine[l] = *(const four *)(x + 4 * (i * lanes + l));
             for (int r = 0; r < b; r++) {
-                read_row(&sum[l][r], &p->diag, (i * b + r) * b, parted);
+                read_row(&sum[l][r], &p->diag, (i * b + r) * b, parted && !p->diag.whole);
                 sum[l][r] *= mine[l];
             }
         }
@@ -520,7 +520,7 @@ void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, 
     product p = {.y = y,
                  .A = &level->A,
                  .off = {.single = level->off, .rest = level->off_rest},
-                 .diag = {.single = level->diag, .rest = level->diag_rest},
+                 .diag = {.whole = level->A.diag, .single = level->diag, .rest = level->diag_rest},
                  .x = x,
                  .lanes = lanes};
     multiply_all(&p);
@@ -587,10 +587,15 @@ static uz_rests leave_rests(double **whole, const float *single, int64_t count)
     return (uz_rests){rests, unit};
 }
 
+void uz_level_part_off(uz_level *level)
+{
+    uz_blocks *A = &level->A;
+    level->off_rest = leave_rests(&A->off, level->off, A->ptr[A->nodes] * A->b * A->b);
+}
+
 void uz_level_part(uz_level *level)
 {
     uz_blocks *A = &level->A;
-    const int64_t size = (int64_t)A->b * A->b;
-    level->off_rest = leave_rests(&A->off, level->off, A->ptr[A->nodes] * size);
-    level->diag_rest = leave_rests(&A->diag, level->diag, A->nodes * size);
+    uz_level_part_off(level);
+    level->diag_rest = leave_rests(&A->diag, level->diag, A->nodes * A->b * A->b);
 }

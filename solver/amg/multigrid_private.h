@@ -150,11 +150,12 @@ enum {
 };
 void uz_level_take_step(const uz_level_step *step, int parts);
 
-/* uz_blocks_multiply where A is in two parts. */
+/* uz_blocks_multiply where A is in two parts, or all but its diagonal is. */
 void uz_level_multiply_parts(double *y, const uz_level *level, const double *x, int lanes);
 /* The numbers of A, at most 4, become those that single precision has left off: level 0, whose sweeps have the others.
  */
 void uz_level_part(uz_level *level);
+void uz_level_part_off(uz_level *level); /* those off the diagonal alone: where sweeps have another diagonal than A */
 /* Block e of A->off, or that of node e of A->diag, from A or from its parts; room: size, b x b, where it may be put. */
 UZ_INLINE const double *uz_level_block(double *room, const uz_level *level, bool own, int64_t e, int64_t size)
 {

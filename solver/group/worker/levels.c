@@ -216,6 +216,17 @@ static void free_blocks(spread_rows *rows)
     rows->value = NULL;
 }
 
+/* Blocks as K's product has them from now on (amg/multigrid_private.h). Those of ghosts are to be halved and doubled
+ * without loss, as single precision is: their rests are even. */
+static void part_blocks(spread_system *s)
+{
+    const uz_blocks *A = &s->level.A;
+    const int64_t size = (int64_t)s->b * s->b;
+    uz_level_part_off(&s->level);
+    for (int64_t e = A->ptr[s->near.here] * size; e < A->ptr[A->nodes] * size; e++)
+        s->level.off_rest.value[e] &= ~1;
+}
+
 static void make_finest(spread_system *s, spread_rows *rows)
 {
     uz_error err = {0};
@@ -229,6 +240,7 @@ static void make_finest(spread_system *s, spread_rows *rows)
     must(uz_level_round(&s->level, &err), &err);
     add_sums(s);
     bound_by_diagonal(s);
+    part_blocks(s);
 }
 
 /* ---- the way to the next one */
@@ -355,9 +367,11 @@ static void fetch_prolongation(spread_system *s)
 static void scale_ghosts(spread_system *s, double factor)
 {
     const int64_t size = (int64_t)s->b * s->b;
-    uz_blocks *A = &s->level.A;
-    for (int64_t e = A->ptr[s->near.here] * size; e < A->ptr[A->nodes] * size; e++)
-        A->off[e] *= factor;
+    const uz_blocks *A = &s->level.A;
+    for (int64_t e = A->ptr[s->near.here] * size; e < A->ptr[A->nodes] * size; e++) {
+        s->level.off[e] *= (float)factor;
+        s->level.off_rest.value[e] = (int32_t)(s->level.off_rest.value[e] * factor);
+    }
 }
 
 /* ---- sums over processes */
@@ -763,7 +777,7 @@ int64_t system_bytes(const spread_system *s, int which)
         return coarse;
     const int64_t prolongation = s->level.ptr ? s->level.ptr[nodes] * (4 + 4 * s->b * s->k) : 0;
     return coarse + blocks_bytes(&s->level.A) + blocks_bytes(&s->next) + prolongation +
-           4 * size * (s->level.A.ptr[nodes] + nodes) + nodes * (24 + 60 * LANES * 4);
+           4 * size * (2 * s->level.A.ptr[nodes] + nodes) + nodes * (24 + 60 * LANES * 4);
 }
 
 int system_levels(const spread_system *s, int which)
@@ -774,10 +788,15 @@ int system_levels(const spread_system *s, int which)
 void system_free(spread_system *s)
 {
     uz_level *level = &s->level;
-    void *own[] = {s->scale,    level->off,  level->diag, level->inverse, level->ptr, level->block, level->value,
-                   s->face,     s->outside,  s->modes,    s->rhs,         s->x,       s->t,         s->coarse,
-                   s->coarse_r, s->coarse_z, s->u,        s->f,           s->r,       s->z,         s->p,
-                   s->q,        s->diagonal, s->rim,      s->ghosts,      s->brim};
+    void *own[] = {s->scale,       level->off,  level->diag,
+                   level->inverse, level->ptr,  level->block,
+                   level->value,   s->face,     s->outside,
+                   s->modes,       s->rhs,      s->x,
+                   s->t,           s->coarse,   s->coarse_r,
+                   s->coarse_z,    s->u,        s->f,
+                   s->r,           s->z,        s->p,
+                   s->q,           s->diagonal, s->rim,
+                   s->ghosts,      s->brim,     level->off_rest.value};
     free_variant(s, VARIANT_HELD);
     free_variant(s, VARIANT_WHOLE);
     for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)

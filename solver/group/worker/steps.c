@@ -196,7 +196,7 @@ static void multiply(spread_system *s, int which, double *y, double *x)
     const int width = 4 * s->lanes;
     const float *inverse = s->variant[which].inverse;
     neighbours_fetch(&s->near, x + width * here, x, (size_t)width * sizeof *x);
-    uz_blocks_multiply(y, &s->level.A, x, s->lanes);
+    uz_level_multiply_parts(y, &s->level, x, s->lanes);
     for (int64_t i = 0; i < here; i++)
         for (int q = 0; q < width; q++)
             if (q % 4 >= s->b || !(inverse[i * s->b + q % 4] > 0.0F))
