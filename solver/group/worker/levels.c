@@ -540,8 +540,23 @@ static uz_team team_of(const spread_system *s)
 /* A function on held dofs but for so much of its energy is left out. */
 #define LOST 1e-5
 
-/* Of the next matrix, or of what holding dofs leaves of it. NULL where rounding has made that indefinite. */
-static uz_multigrid *make_coarse(const spread_system *s, const uz_blocks *A)
+/* A->off, which were freed. */
+static void take_back(uz_blocks *A, const uz_csc *columns)
+{
+    const int64_t b = A->b;
+    A->off = new_zeros(A->ptr[A->nodes] * b * b + 4, sizeof *A->off);
+    for (int64_t j = 0; j < columns->cols; j++)
+        for (int64_t e = columns->ptr[j]; e < columns->ptr[j + 1]; e++) {
+            const int64_t i = columns->idx[e];
+            if (i / b > j / b)
+                A->off[(uz_blocks_find(A, i / b, (int32_t)(j / b)) * b + i % b) * b + j % b] = columns->val[e];
+        }
+}
+
+/* Of the next matrix, or of what holding dofs leaves of it. NULL where rounding has made that indefinite. Numbers off
+ * the diagonal are not A's any more, whose room the levels take, unless there is one level, which held dofs make anew.
+ */
+static uz_multigrid *make_coarse(const spread_system *s, uz_blocks *A)
 {
     const int k = s->k;
     const int64_t n = A->nodes * k;
@@ -557,10 +572,14 @@ static uz_multigrid *make_coarse(const spread_system *s, const uz_blocks *A)
         there[i] = A->diag[at] > LOST * s->next.diag[at] ? 1.0F : 0.0F;
     }
     must(uz_blocks_to_columns(&columns, A, there, &err), &err);
+    free(A->off);
+    A->off = NULL;
     const uz_team team = team_of(s);
     const uz_status status = uz_multigrid_create(&made, &columns, &modes, &team, 0, NULL, &err);
     if (status != UZ_OK && status != UZ_ERR_NOT_SPD)
         end_group(err.message);
+    if (made && made->levels == 1)
+        take_back(A, &columns);
     uz_csc_clear(&columns);
     free(modes.node);
     free(there);
@@ -659,10 +678,6 @@ void system_create(spread_system *s, spread_rows *rows)
     memcpy(s->variant[VARIANT_WHOLE].inverse, s->level.inverse, (size_t)end * sizeof(float));
     if (s->next.nodes > 0)
         set_coarse(&s->variant[VARIANT_WHOLE], make_coarse(s, &s->next), &s->near);
-    if (system_levels(s, VARIANT_WHOLE) > 2) { /* of the next matrix its places alone are asked for again */
-        free(s->next.off);
-        s->next.off = NULL;
-    }
     make_room(s);
 }
 
