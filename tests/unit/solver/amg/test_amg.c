@@ -185,12 +185,36 @@ static void check_lanes(pair *p)
     free(image);
 }
 
+/* Blocks in parts beside a diagonal that is whole, as a group has them. */
+static void check_whole_diagonal(const pair *p)
+{
+    const uz_level *level = &((const uz_aggregates *)p->amg->mg)->level[0];
+    const int64_t nodes = level->A.nodes, size = (int64_t)level->A.b * level->A.b, n = 4 * nodes;
+    uz_level whole = *level;
+    double *x = vector(n), *y = vector(n), *parted = vector(n), block[9];
+    whole.A.diag = vector(nodes * size + 4);
+    whole.diag = NULL;
+    whole.diag_rest = (uz_rests){NULL, 0.0};
+    for (int64_t i = 0; i < nodes; i++) {
+        memcpy(whole.A.diag + i * size, uz_level_block(block, level, true, i, size), (size_t)size * sizeof block[0]);
+        for (int c = 0; c < level->A.b; c++)
+            x[4 * i + c] = sin((double)(4 * i + c));
+    }
+    uz_level_multiply_parts(parted, level, x, 1);
+    uz_level_multiply_parts(y, &whole, x, 1);
+    for (int64_t i = 0; i < n; i++)
+        CHECK(i % 4 >= level->A.b || y[i] == parted[i]);
+    uz_free_all(x, y, parted, whole.A.diag);
+}
+
 TEST(two_lanes_are_two_cycles)
 {
     pair plane = open_plane(paper_scene(120, 40), true),
          solid = open_brick((const int64_t[]){12, 12, 12}, (const double[]){1, 1, 1}, 0.3);
     check_lanes(&plane);
     check_lanes(&solid);
+    check_whole_diagonal(&plane);
+    check_whole_diagonal(&solid);
     close_pair(&plane);
     close_pair(&solid);
 }
