@@ -61,7 +61,7 @@ class Scene:
         self.springs = [beside.uniform(0.05, 1), beside.uniform(0.05, 1)] if self.element != "hex8" and not ring and not self.group and beside.random() < 0.25 else None
         self.pull = [rng.uniform(-0.06, 0.06) for _ in range(2)] if self.element != "hex8" and not ring and rng.random() < 0.5 else None  # on its right side
         self.warm = rng.uniform(-0.1, 0.15) if rng.random() < 0.4 else 0.0
-        self.press = random.Random(f"leaning {number}").uniform(0.02, 0.15) if leaning else None
+        self.press = random.Random(f"leaning {number}").uniform(0.02, 0.15) if leaning else 0.0
         if leaning:
             self.springs, self.aside = None, 0.2 * self.aside
             for a, b in self.side["top"] if self.element == "quad8" else ():  # loaded sides are straight
