@@ -126,6 +126,7 @@ PHRASES = {
     "the answer by more than 5 %. What": constant(0.05, r"UZ_MOST_SLIDING ([\d.]+)"),
     "the answer by more than 5 % in the energy norm": None, "`sliding` from 5 % on.": None,  # the same
     "one of them is more than 2 % it tries another": constant(0.02, r"#define TRIED +([\d.]+)"),
+    "is more than 2 % of the edge before anything moves, of a circle of radius R from about R < 4.2 edges": constant(0.02, r"#define EARLY +([\d.]+)"),  # 2/3 of a bow of 1/(8 R)
     "a tolerance of 1e-24 of the terms": None, "off by up to 0.2 %.": None,  # what was
     "was told to err by 99 % in forces": None,  # what was
     "300 of all kinds in other words": lambda program: "other words\", 300)" in (program.root / "tests/extremes/generated_words.py").read_text(),
