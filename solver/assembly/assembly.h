@@ -288,6 +288,9 @@ bool uz_is_stretched(const uz_body_model *model, const double *nodal, bool large
 /* May rows h - N u press on a body that is carried to u (d)? One closes, or nears it more than what rounding of so long
  * a way hides. Also where there is no memory to tell. */
 bool uz_may_press(const uz_csc *N, const double *h, const double *u);
+/* Do rows that may press, or touch, hold the parts of the body together, of which none is much larger than another?
+ * Else what strains one of them may be rounding beside the way of another. Without memory they do not. */
+bool uz_is_together(const uz_body_model *model, const uz_csc *N, const double *h, const double *u);
 /* ||u||_K over all dofs, springs included, from the free dofs u (d) and the prescribed values. */
 uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
                         uz_error *err);

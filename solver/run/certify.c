@@ -84,7 +84,8 @@ uz_acting uz_run_acting(const uz_run *run, const uz_csc *N, const double *h, con
         return UZ_ACTING_LOADS;
     if (!load->moved || !uz_may_press(N, h, u))
         return UZ_ACTING_NOTHING;
-    return is_alike(&run->asked->setup->model) ? UZ_ACTING_ROWS : UZ_ACTING_LOADS;
+    const uz_body_model *model = &run->asked->setup->model;
+    return is_alike(model) && uz_is_together(model, N, h, u) ? UZ_ACTING_ROWS : UZ_ACTING_LOADS;
 }
 
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err)

@@ -5,7 +5,7 @@ import math
 
 import service
 from service import check, expect
-from two_bodies import PLANE, SOLID, body
+from two_bodies import PLANE, SOLID, body, plate
 
 SHARED = True  # one service for all tests
 
@@ -432,6 +432,46 @@ def test_bodies_that_come_to_touch_press_with_nothing(s):
     far, near = (s.solved(put(gap, 0, 1e-9, "small"))["summary"] for gap in (0.125, 0))
     check(near["outcome"] == "converged" and abs(far["contact"]["force"][1] / near["contact"]["force"][1] - 1) < 1e-5,
           far["contact"]["force"], near["contact"]["force"])
+
+
+def test_what_is_pressed_beside_a_body_that_is_carried(s):
+    """Blocks that touch are pressed by 2^-50 of the way on which others come to touch: it is their whole way, and their force
+    is no rounding of it."""
+    def put(way, deeper):
+        parts = [(0, 0, 0), (0, 1 + way, 1), (-5, 0, 0), (-5, 1, 1)]
+        nodes, elements, sides = [], [], []
+        for x, y, upper in parts:
+            part = plate("quad4", (4 + upper, 2), len(nodes), lambda a, b, x=x, y=y: (x + 2 * a, y + b))
+            nodes, elements, sides = nodes + part[0], elements + part[1], sides + [part[2]]
+        mesh = {"nodes": nodes, "elements": {"quad4": elements},
+                "groups": {f"{side} {k}": {"edges": sides[k][side]} for k in range(4) for side in ("top", "bottom")}}
+        return {"problem": {"kind": "scene", "mesh": mesh, "model": "plane_strain", "kinematics": "small",
+                            "materials": [{"on": "all", "young": 100, "poisson": 0.3}],
+                            "supports": [{"on": on, "ux": 0, "uy": -by} for on, by in
+                                         (("bottom 0", 0), ("top 1", way), ("bottom 2", 0), ("top 3", deeper))],
+                            "contacts": [{"on": "bottom 1", "with": "top 0"}, {"on": "bottom 3", "with": "top 2"}]}}
+
+    alone, beside = (s.solved(put(way, 2.0**-30))["summary"] for way in (0, 2.0**20))
+    force = alone["contact"]["force"][1]
+    check(alone["outcome"] == "converged" and force > 0, alone)
+    check(beside["outcome"] == "precision_limit" and beside["certificate"]["relative_error"] > 0.01, beside)
+    check(0.5 < beside["contact"]["force"][1] / force < 2, beside["contact"]["force"], force)
+
+
+def test_a_small_block_under_a_large_one_that_is_carried(s):
+    """A cube is pressed by 2^-46 of the way of a body of a thousand times its size: by 64 roundings of the way, as told."""
+    def put(way):
+        large = lambda x, y, z: (1024 * (x - 0.5), 1024 * (y - 0.5), 1 + way + 1024 * z)
+        return body(["hex8", "hex8"], [(2, 2, 2), (3, 3, 2)], [lambda x, y, z: (x, y, z), large],
+                    {"low": [(0, "z1")], "high": [(1, "z0")], "foot": [(0, "z0")], "lid": [(1, "z1")]}, model="solid",
+                    materials=[{"on": "all", "young": 100, "poisson": 0.3}], kinematics="small",
+                    supports=[{"on": "foot", "ux": 0, "uy": 0, "uz": 0},
+                              {"on": "lid", "ux": 0, "uy": 0, "uz": -way - 2.0**-36}],
+                    contacts=[{"on": "low", "with": "high"}])
+
+    near, far = (s.solved(put(way))["summary"] for way in (0, 1024))
+    check(near["outcome"] == "converged" and far["outcome"] == "precision_limit", near["outcome"], far["outcome"])
+    check(abs(far["contact"]["force"][2] / near["contact"]["force"][2] - 1) < 0.1, far["contact"], near["contact"])
 
 
 service.main(globals())
