@@ -10,6 +10,7 @@
 #include "post/parts.h"
 #include "post/trend.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -163,6 +164,13 @@ static uz_status look_at_answer(uz_coarse_contact *coarse, uz_result *result, co
     return status == UZ_OK ? x.status : status;
 }
 
+/* Is all strain of bodies that may touch less than what places are rounded by? Only where the norm is that of a motion.
+ * What supports alone strain as little is given like that. */
+static bool is_rounding(const uz_evaluation *e, const uz_certificate *c)
+{
+    return e->n_contacts > 0 && sqrt(2 * e->strain_energy) < 8 * DBL_EPSILON * c->energy_norm;
+}
+
 uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
                       uz_error *err)
 {
@@ -183,6 +191,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         summary->discretization_error = uz_estimate_mesh_error(NULL, &summary->stress_share, model, scene, result->u);
     if (isnan(summary->discretization_error) && !result->ray)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
+    if (is_rounding(e, &summary->certificate))
+        summary->discretization_error = 0;
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
     if (status == UZ_OK)
