@@ -72,8 +72,9 @@ static bool are_alike(double *size, const uz_body_model *model, const int64_t *p
         double xyz[3 * UZ_ELEMENT_NODES];
         int nodes;
         const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
-        uz_body_element(&element, xyz, model, e);
-        size[part[node[0]]] += pow(uz_element_volume(&element), 1 - 2.0 / model->mesh.dim);
+        if (model->mesh.dim == 3)
+            uz_body_element(&element, xyz, model, e);
+        size[part[node[0]]] += model->mesh.dim == 3 ? cbrt(uz_element_volume(&element)) : 1;
     }
     for (int64_t i = 0; i < count; i++) {
         least = fmin(least, size[i]);
@@ -102,9 +103,10 @@ bool uz_is_together(const uz_body_model *model, const uz_csc *N, const double *h
                 uz_join(root, first[i], part[k / dim]);
             }
     }
-    bool together = count == 1 || (size && are_alike(size, model, part, count));
+    bool together = count == 1 || size;
     for (int64_t i = 0; i < count && root && together; i++)
         together = uz_join_root(root, i) == 0;
+    together = together && (count == 1 || are_alike(size, model, part, count));
     uz_free_all(part, first, root, way, size);
     return together;
 }
