@@ -72,8 +72,7 @@ uz_status uz_finite_check_pressed(const uz_finite_run *run, uz_error *err)
                                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes",
                                                     (long long)run->base.mesh.n_nodes);
     if (status == UZ_OK) {
-        for (int64_t i = 0; i < run->n; i++)
-            nodal[i] = run->loads[i];
+        memcpy(nodal, run->loads, (size_t)run->n * sizeof *nodal);
         if (run->follows)
             status = uz_follower_loads(nodal, &run->base, &run->scene, rest, err);
     }
