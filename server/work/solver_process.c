@@ -5,6 +5,7 @@
 #include "work/solver_process.h"
 #include "base/clock.h"
 #include "base/memory.h"
+#include "core/alloc.h"
 #include "core/sanitized.h"
 #include "work/answers.h"
 #include "work/confine.h"
@@ -32,7 +33,6 @@
 #define IDLE_MS   (300 * 1000) /* then it goes back to the system */
 
 #define HEAP_FREE  ((size_t)16 << 20) /* may lie free where no large body was solved */
-#define HUGE_PAGE  ((size_t)2 << 20)
 #define SMALL_PAGE 4096
 
 #define LIMIT_ROOM ((size_t)512 << 20) /* beyond cache and twice what a solve may take: texts, answers, libraries */
@@ -299,7 +299,7 @@ static int make_ready(solver *s)
     void *block = NULL;
     if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
         malloc_trim(0);
-    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, HUGE_PAGE, least) == 0) {
+    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, UZ_HUGE_PAGE, least) == 0) {
         madvise(block, least, MADV_HUGEPAGE);
         for (size_t at = 0; at < least; at += SMALL_PAGE)
             ((volatile char *)block)[at] = 0;

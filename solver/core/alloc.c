@@ -15,14 +15,12 @@ static bool bytes_for(int64_t count, size_t size, size_t *bytes)
     return true;
 }
 
-#define HUGE_PAGE ((size_t)2 << 20)
-
 /* Asks for huge pages wherever the block has a part of one: beside it is heap, which other blocks have, or nothing,
  * which is told as ENOMEM and is no lack of memory. Where that is refused small pages do. */
 static void ask_for_huge_pages(void *block, size_t bytes)
 {
-    const uintptr_t first = (uintptr_t)block & ~(HUGE_PAGE - 1),
-                    end = ((uintptr_t)block + bytes + HUGE_PAGE - 1) & ~(HUGE_PAGE - 1);
+    const uintptr_t first = (uintptr_t)block & ~(UZ_HUGE_PAGE - 1),
+                    end = ((uintptr_t)block + bytes + UZ_HUGE_PAGE - 1) & ~(UZ_HUGE_PAGE - 1);
     const int error = errno;
     madvise((void *)first, end - first, MADV_HUGEPAGE);
     errno = error;
@@ -33,7 +31,7 @@ void *uz_malloc_huge(size_t bytes)
     void *block = NULL;
     if (bytes < UZ_HUGE_LEAST)
         return malloc(bytes);
-    if (posix_memalign(&block, HUGE_PAGE, bytes) != 0)
+    if (posix_memalign(&block, UZ_HUGE_PAGE, bytes) != 0)
         return NULL;
     ask_for_huge_pages(block, bytes);
     return block;
@@ -49,7 +47,7 @@ void *uz_alloc_zero(int64_t count, size_t size)
 {
     size_t bytes;
     void *block = bytes_for(count, size, &bytes) ? calloc(1, bytes) : NULL;
-    if (block && bytes >= HUGE_PAGE)
+    if (block && bytes >= UZ_HUGE_PAGE)
         ask_for_huge_pages(block, bytes);
     return block;
 }

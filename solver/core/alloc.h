@@ -15,7 +15,8 @@ void *uz_alloc_zero(int64_t count, size_t size);
  * pages. A factor of 200 MB is touched once, page by page: with 4 kB pages a fifth of its time went into page faults.
  * Zeroed ones ask for them, too: what is read before it is written has two faults a page, the second of which stops
  * all threads of the process. Free with free(). */
-#define UZ_HUGE_LEAST ((size_t)4 << 20)
+#define UZ_HUGE_PAGE  ((size_t)2 << 20) /* of the kernel */
+#define UZ_HUGE_LEAST (2 * UZ_HUGE_PAGE)
 void *uz_malloc_huge(size_t bytes);
 
 /* Grows or shrinks; on failure NULL and the old block stays. */

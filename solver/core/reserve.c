@@ -8,15 +8,16 @@
  * kernel for them and writes nothing: before a block is taken, as far as it was announced, and while it is filled. */
 #include "core/reserve.h"
 
+#include "core/alloc.h"
+
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 
-#define HUGE_PAGE ((size_t)2 << 20)
-#define FILL      (16 * HUGE_PAGE)
-#define LONG      (4 * HUGE_PAGE) /* less is not worth waking the helper */
+#define FILL (16 * UZ_HUGE_PAGE)
+#define LONG (4 * UZ_HUGE_PAGE) /* less is not worth waking the helper */
 
 /* Huge pages in one mapping: mremap takes no more than one at a time. */
 typedef struct piece {
@@ -62,14 +63,14 @@ uz_reserve *uz_reserve_new(size_t most, size_t ready)
 static char *map(size_t bytes)
 {
     char *all =
-        mmap(NULL, bytes + HUGE_PAGE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+        mmap(NULL, bytes + UZ_HUGE_PAGE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (all == MAP_FAILED)
         return NULL;
-    const size_t before = (HUGE_PAGE - (size_t)all % HUGE_PAGE) % HUGE_PAGE;
+    const size_t before = (UZ_HUGE_PAGE - (size_t)all % UZ_HUGE_PAGE) % UZ_HUGE_PAGE;
     if (before > 0)
         munmap(all, before);
-    if (before < HUGE_PAGE)
-        munmap(all + before + bytes, HUGE_PAGE - before);
+    if (before < UZ_HUGE_PAGE)
+        munmap(all + before + bytes, UZ_HUGE_PAGE - before);
     madvise(all + before, bytes, MADV_HUGEPAGE); /* a wish: where it is refused, small pages do */
     return all + before;
 }
@@ -132,7 +133,7 @@ static void keep(uz_reserve *reserve, piece *freed)
     while (freed) {
         piece *next = freed->next;
         const size_t all = reserve->block_bytes + reserve->kept_bytes;
-        const size_t room = all < reserve->most ? (reserve->most - all) / HUGE_PAGE * HUGE_PAGE : 0;
+        const size_t room = all < reserve->most ? (reserve->most - all) / UZ_HUGE_PAGE * UZ_HUGE_PAGE : 0;
         if (freed->bytes > room && room > 0) {
             munmap(freed->at + room, freed->bytes - room);
             freed->bytes = room;
@@ -171,15 +172,16 @@ static void *touch_ahead(void *arg)
         char *const at = reserve->ahead;
         const size_t all = reserve->block_bytes + reserve->kept_bytes;
         if (at < reserve->ahead_end) {
-            reserve->ahead += HUGE_PAGE;
+            reserve->ahead += UZ_HUGE_PAGE;
             pthread_mutex_unlock(&reserve->mutex);
-            good = madvise(at, HUGE_PAGE, MADV_POPULATE_WRITE) == 0; /* false too where the block has gone meanwhile */
+            /* false too where the block has gone meanwhile */
+            good = madvise(at, UZ_HUGE_PAGE, MADV_POPULATE_WRITE) == 0;
             pthread_mutex_lock(&reserve->mutex);
             if (!good)
                 reserve->ahead = reserve->ahead_end;
-        } else if (reserve->kept_bytes < reserve->expected && all + HUGE_PAGE <= reserve->most) {
+        } else if (reserve->kept_bytes < reserve->expected && all + UZ_HUGE_PAGE <= reserve->most) {
             pthread_mutex_unlock(&reserve->mutex);
-            good = keep_fresh(reserve, HUGE_PAGE);
+            good = keep_fresh(reserve, UZ_HUGE_PAGE);
             pthread_mutex_lock(&reserve->mutex);
             if (!good)
                 reserve->expected = 0;
@@ -225,9 +227,9 @@ void uz_reserve_expect(uz_reserve *reserve, size_t bytes)
 
 void *uz_reserve_take(uz_reserve *reserve, size_t bytes)
 {
-    if (bytes > PTRDIFF_MAX - 2 * HUGE_PAGE)
+    if (bytes > PTRDIFF_MAX - 2 * UZ_HUGE_PAGE)
         return NULL;
-    bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
+    bytes = (bytes + UZ_HUGE_PAGE - 1) / UZ_HUGE_PAGE * UZ_HUGE_PAGE;
     block *b = calloc(1, sizeof *b);
     if (!b || !(b->at = map(bytes))) {
         free(b);
@@ -292,7 +294,7 @@ bool uz_reserve_fill(uz_reserve *reserve)
     size_t bytes = goal > reserve->kept_bytes ? goal - reserve->kept_bytes : 0;
     pthread_mutex_unlock(&reserve->mutex);
     const bool more = bytes > FILL;
-    bytes = (more ? FILL : bytes) / HUGE_PAGE * HUGE_PAGE;
+    bytes = (more ? FILL : bytes) / UZ_HUGE_PAGE * UZ_HUGE_PAGE;
     return bytes > 0 && keep_fresh(reserve, bytes) && more;
 }
 
@@ -304,7 +306,7 @@ void uz_reserve_give_back(uz_reserve *reserve, size_t bytes)
     while (reserve->kept && bytes > 0) {
         piece *first = reserve->kept;
         if (first->bytes > bytes) { /* whole pages of its end */
-            const size_t part = bytes / HUGE_PAGE * HUGE_PAGE;
+            const size_t part = bytes / UZ_HUGE_PAGE * UZ_HUGE_PAGE;
             first->bytes -= part;
             reserve->kept_bytes -= part;
             munmap(first->at + first->bytes, part);

@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <sys/mman.h>
 
-#define HUGE_PAGE  ((size_t)2 << 20)
 #define SMALL_PAGE ((size_t)4096)
 /* What is larger goes back to the system where it is freed. */
 #define MOST (INT_MAX / 2)
@@ -18,8 +17,8 @@
 static void *touch(void *arg)
 {
     fresh_pages *fresh = arg;
-    for (size_t at = 0; at < fresh->bytes && !atomic_load(&fresh->over); at += HUGE_PAGE)
-        if (madvise(fresh->at + at, fresh->bytes - at < HUGE_PAGE ? fresh->bytes - at : HUGE_PAGE,
+    for (size_t at = 0; at < fresh->bytes && !atomic_load(&fresh->over); at += UZ_HUGE_PAGE)
+        if (madvise(fresh->at + at, fresh->bytes - at < UZ_HUGE_PAGE ? fresh->bytes - at : UZ_HUGE_PAGE,
                     MADV_POPULATE_WRITE) != 0)
             break;
     return NULL;
@@ -30,7 +29,7 @@ void fresh_begin(fresh_pages *fresh, int64_t bytes)
 {
     fresh_end(fresh);
     bytes = bytes < MOST ? bytes : MOST;
-    if (bytes < (int64_t)HUGE_PAGE)
+    if (bytes < (int64_t)UZ_HUGE_PAGE)
         return;
     char *block = uz_alloc(bytes, 1);
     if (!block) /* as many as there will be, about: who needs them says so */
