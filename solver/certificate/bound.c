@@ -103,13 +103,11 @@ bool uz_bound_blames_distance(const uz_certificate *out, double square, double r
  * left is no rounding, so that what is small beside the motion, but not beside the strains, is not taken for it. */
 #define RIGID    1e-10
 #define ROUNDING 1e-12
-/* Less than what places of nodes are rounded by presses on nobody. */
-#define TOUCHING (8 * DBL_EPSILON)
 
 double uz_bound_reference(double whole_norm, double free_norm, double error, uz_acting acting)
 {
     const bool apart = acting == UZ_ACTING_NOTHING ||
-                       (acting == UZ_ACTING_ROWS && whole_norm + error <= TOUCHING * free_norm),
+                       (acting == UZ_ACTING_ROWS && whole_norm + error <= UZ_TOUCHING * free_norm),
                rigid = apart && whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm;
     return rigid ? free_norm : whole_norm;
 }

@@ -4,6 +4,11 @@
 
 #include "uzawa.h"
 
+#include <float.h>
+
+/* Of the norm of a motion: less than what places of nodes are rounded by presses on nobody. */
+#define UZ_TOUCHING (8 * DBL_EPSILON)
+
 /* What acts on a body beside its supports. */
 typedef enum {
     UZ_ACTING_NOTHING,

@@ -1,5 +1,6 @@
 #include "post/evaluate.h"
 
+#include "certificate/bound.h"
 #include "core/alloc.h"
 #include "core/aside.h"
 #include "core/error.h"
@@ -10,7 +11,6 @@
 #include "post/parts.h"
 #include "post/trend.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -168,7 +168,7 @@ static uz_status look_at_answer(uz_coarse_contact *coarse, uz_result *result, co
  * What supports alone strain as little is given like that. */
 static bool is_rounding(const uz_evaluation *e, const uz_certificate *c)
 {
-    return e->n_contacts > 0 && sqrt(2 * e->strain_energy) < 8 * DBL_EPSILON * c->energy_norm;
+    return e->n_contacts > 0 && sqrt(2 * e->strain_energy) < UZ_TOUCHING * c->energy_norm;
 }
 
 uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead,
