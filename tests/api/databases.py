@@ -4,6 +4,8 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
+import struct
 import subprocess
 import tempfile
 import time
@@ -84,6 +86,19 @@ class Server:
     def sql(self, database, statement):
         """The rows, each a list of texts."""
         return rows(self.address(database), statement)
+
+    def silent(self, database, statement):
+        """A connection as of a daemon's that was stopped after this statement, in the midst of its transaction: no end of
+        the pipeline follows."""
+        def message(kind, *parts):
+            body = b"".join(part if isinstance(part, bytes) else part.encode() + b"\0" for part in parts)
+            return kind + struct.pack("!I", len(body) + 4) + body
+        connection = socket.socket(socket.AF_UNIX)
+        connection.connect(os.path.join(self.folder, f".s.PGSQL.{self.port}"))
+        connection.sendall(message(b"", struct.pack("!I", 3 << 16), "user", "postgres", "database", database, "application_name",
+                                   "uzawad", b"\0"))
+        connection.sendall(message(b"P", "", statement, bytes(2)) + message(b"B", bytes(8)) + message(b"E", bytes(5)))
+        return connection
 
 
 SHARED = []

@@ -289,6 +289,21 @@ def test_one_is_stopped_past_its_lease(s):
         check(stopped.solve(numbered(1))["status"] == "successful", "it serves on")
 
 
+def test_one_is_stopped_in_the_midst_of_a_transaction(s):
+    """What it has locked is free again, though its connection stands: its job is run by another."""
+    with daemons(s.build, 2) as ((a, b), name):
+        job = a.post(ENDLESS).json["id"]
+        stopped, other = run_by((a, b), job)
+        halt(stopped)
+        with SERVER.silent(name, f"SELECT 1 FROM uzawa.job WHERE id = '{job}' FOR UPDATE"):
+            wait_until(lambda: SERVER.sql(name, "SELECT 1 FROM pg_stat_activity WHERE query LIKE '%FOR UPDATE' AND"
+                                                " wait_event = 'ClientRead' AND state = 'active'"))
+            SERVER.sql(name, f"DELETE FROM uzawa.node WHERE pid = {stopped.process.pid}")  # its jobs are nobody's from here on
+            wait_until(lambda: any(event["job"] == job for event in other.events("job_started")), seconds=60)
+        stopped.process.send_signal(signal.SIGCONT)
+        other.request("DELETE", f"/v1/jobs/{job}")
+
+
 def test_the_database_is_away_for_a_while(s):
     with daemons(s.build, 1) as ((a,), name):
         posted = {a.post(numbered(i)).json["id"]: i for i in range(5)}

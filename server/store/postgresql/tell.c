@@ -106,6 +106,15 @@ static bool send_message(postgresql_store *s, link_to *l)
     return link_end(l) == STORE_OK;
 }
 
+/* Ends the transactions of daemons that fell silent in their midst: one that is stopped, or whose machine has gone.
+ * What they have locked nobody else could end, run again or write. PostgreSQL's own limit for idle transactions does
+ * not count while it waits for the next call of a pipeline. Sees those of the same role only; a daemon that was merely
+ * slow tries again. */
+#define END_SILENT                                                                                                     \
+    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database()"                        \
+    " AND usename = current_user AND application_name = current_setting('application_name') AND state = 'active'"      \
+    " AND wait_event = 'ClientRead' AND query_start < clock_timestamp() - interval '20 s'"
+
 /* Says that this node lives, and forgets those that have not for a day, and clients that have asked nothing for an
  * hour. */
 static bool beat(postgresql_store *s, link_to *l)
@@ -117,6 +126,7 @@ static bool beat(postgresql_store *s, link_to *l)
     link_send(l, &c);
     link_send(l, &(call){.sql = "DELETE FROM uzawa.node WHERE seen < uzawa.moment() - 86400"});
     link_send(l, &(call){.sql = "DELETE FROM uzawa.rate WHERE at < uzawa.moment() - 3600"});
+    link_send(l, &(call){.sql = END_SILENT});
     return link_end(l) == STORE_OK;
 }
 
