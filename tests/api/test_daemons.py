@@ -17,6 +17,8 @@ import databases
 import service
 from service import ENDLESS, MATRICES, SCENE, Service, check, expect, together, wait_until
 
+LISTENERS = ("SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND application_name = 'uzawad'"
+             " AND query ~ 'LISTEN|pg_notify|pg_terminate_backend'")
 SERVER = None  # one for all tests, made by the first
 
 
@@ -323,6 +325,24 @@ def test_the_database_is_away_for_a_while(s):
         check(found["status"] == "successful" and found["attempts"] == 1, found)
         last = a.post(numbered(9), {"Idempotency-Key": "later"}).json["id"]
         check_all(a, name, {**posted, last: 9})
+
+
+def test_messages_that_stay_away_keep_no_job_waiting(s):
+    """Connections that listen answer no more, and are not closed: the others find what waits, before 45 s show that."""
+    with daemons(s.build, 2) as (both, name):
+        busy = both[0].post(ENDLESS).json["id"]
+        runs, idle = run_by(both, busy)
+        wait_until(lambda: int(SERVER.sql(name, LISTENERS)[0][0]) == 2)
+        pids = [int(row[0]) for row in SERVER.sql(name, LISTENERS.replace("count(*)", "pid"))]
+        try:
+            for pid in pids:
+                os.kill(pid, signal.SIGSTOP)
+            job = runs.post(numbered(1)).json["id"]
+            wait_until(lambda: idle.get(f"/v1/jobs/{job}").json["status"] == "successful", seconds=30)
+        finally:
+            for pid in pids:
+                os.kill(pid, signal.SIGCONT)
+        runs.request("DELETE", f"/v1/jobs/{busy}")
 
 
 def test_connections_that_are_cut_lose_nothing(s):

@@ -82,6 +82,9 @@ store_status postgresql_over_quota(link_to *l, const char *client, const char *w
  * id "": everybody there is to look again. */
 typedef enum { TELL_CHANGED = 'c', TELL_WAITS = 'w', TELL_GONE = 'g' } tell_what;
 void postgresql_tell(postgresql_store *s, const char *id, tell_what what, const char *client, bool here);
+/* Who just had an answer of the database says so: where the connection that listens is gone or does not answer,
+ * everybody here is told to look. */
+void postgresql_look_if_deaf(postgresql_store *s);
 bool postgresql_tell_begin(postgresql_store *s);
 void postgresql_tell_end(postgresql_store *s);
 

@@ -669,6 +669,8 @@ store_status postgresql_expire(store *base, const char *error_json, int64_t *cou
     const store_status status = postgresql_do(s, LINK_DURABLE, true, &c, read_taken, &t);
     free(lost);
     *count = status == STORE_OK ? t.waited : 0;
+    if (status == STORE_OK)
+        postgresql_look_if_deaf(s);
     return status;
 }
 

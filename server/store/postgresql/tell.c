@@ -16,6 +16,7 @@
 
 #define LOOK_S  1.0
 #define BEAT_S  10.0
+#define DEAF_S  3.0  /* an ear that works is put up each second */
 #define PAUSE_S 0.01 /* between messages: what changes meanwhile is one */
 #define MESSAGE 7900 /* bytes; PostgreSQL takes less than 8000 */
 #define KEPT    (16 * MESSAGE)
@@ -26,6 +27,7 @@ struct told {
     int wake;
     pthread_mutex_t lock; /* what follows */
     bool stop;
+    double hears_at; /* when it last was about to hear, on CLOCK_MONOTONIC */
     size_t len;
     char text[KEPT]; /* lines that are to be sent */
 };
@@ -130,6 +132,28 @@ static bool beat(postgresql_store *s, link_to *l)
     return link_end(l) == STORE_OK;
 }
 
+void postgresql_look_if_deaf(postgresql_store *s)
+{
+    told *t = s->told;
+    const double now = clock_seconds(CLOCK_MONOTONIC);
+    if (!t)
+        return;
+    pthread_mutex_lock(&t->lock);
+    const bool deaf = t->hears_at < now - DEAF_S;
+    if (deaf)
+        t->hears_at = now - DEAF_S + LOOK_S; /* not again before */
+    pthread_mutex_unlock(&t->lock);
+    if (deaf)
+        store_tell(&s->base, NULL, false, NULL);
+}
+
+static void note_hearing(told *t)
+{
+    pthread_mutex_lock(&t->lock);
+    t->hears_at = clock_seconds(CLOCK_MONOTONIC);
+    pthread_mutex_unlock(&t->lock);
+}
+
 static bool has_more(told *t, bool *stop)
 {
     pthread_mutex_lock(&t->lock);
@@ -172,6 +196,8 @@ static void *tell_loop(void *ctx)
         }
         if (l.pg && !good)
             link_close(&l);
+        if (l.pg)
+            note_hearing(t);
         struct pollfd p[2] = {{.fd = t->wake, .events = POLLIN}, {.fd = l.pg ? PQsocket(l.pg) : -1, .events = POLLIN}};
         poll(p, 2, l.pg && has_more(t, &stop) ? (int)(1e3 * PAUSE_S) : 1000);
         eventfd_t unused;
@@ -195,6 +221,7 @@ bool postgresql_tell_begin(postgresql_store *s)
         return false;
     pthread_mutex_init(&t->lock, NULL);
     t->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    t->hears_at = clock_seconds(CLOCK_MONOTONIC);
     s->told = t;
     if (t->wake >= 0 && pthread_create(&t->thread, NULL, tell_loop, s) == 0)
         return true;
