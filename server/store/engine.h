@@ -57,9 +57,10 @@ typedef struct {
     /* It is no more this client's; NULL: nobody's. STORE_CONFLICT while a job of theirs refers to it. *gone: the row
      * went, since nobody has it any more and no job refers to it. */
     store_status (*upload_forget)(store *s, const char *id, const char *client, bool *gone);
-    store_status (*upload_idle)(store *s, double before, upload_info *out); /* no job's, longest unused, since before */
-    store_status (*upload_total)(store *s, int64_t *bytes);                 /* NULL: nobody sends it any */
-    const store_engine_nodes *nodes;                                        /* NULL: a store has one daemon */
+    /* No job's, of those that at `now` were unused for so long the one that was for longest. */
+    store_status (*upload_idle)(store *s, double now, double unused_s, upload_info *out);
+    store_status (*upload_total)(store *s, int64_t *bytes); /* NULL: nobody sends it any */
+    const store_engine_nodes *nodes;                        /* NULL: a store has one daemon */
     store_status (*collect)(store *s, int64_t *count); /* store_collect_objects; NULL: settings.objects is not used */
     store_status (*tidy)(store *s);                    /* NULL: it puts nothing off */
     store_status (*try_write)(store *s);

@@ -117,12 +117,12 @@ store_status store_upload_delete(store *s, const char *id, const char *client)
 
 /* ---- collecting */
 
-/* Under the lock. Deletes the one that was last used longest ago, before `before`; false: there is none, or it can't be
- * deleted now. */
-static bool collect_one(store *s, double before)
+/* Under the lock. Deletes the one that was last used longest ago, unused_s or more; false: there is none, or it can't
+ * be deleted now. */
+static bool collect_one(store *s, double now, double unused_s)
 {
     upload_info found = {.bytes = 0};
-    return s->engine->upload_idle(s, before, &found) == STORE_OK && forget(s, &found, NULL) == STORE_OK;
+    return s->engine->upload_idle(s, now, unused_s, &found) == STORE_OK && forget(s, &found, NULL) == STORE_OK;
 }
 
 store_status store_collect_uploads(store *s, int64_t *count)
@@ -133,7 +133,7 @@ store_status store_collect_uploads(store *s, int64_t *count)
     const double now = store_age_time(s, &held);
     for (bool more = true; more; n += more) { /* the lock is let go between two, for those who send */
         pthread_mutex_lock(&s->uploads->lock);
-        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, now - keep_s);
+        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, now, keep_s);
         pthread_mutex_unlock(&s->uploads->lock);
     }
     if (count)
@@ -202,7 +202,7 @@ static upload_status put(upload_writer *w, const unsigned char *data, size_t siz
     if (limits->one > 0 && more > limits->one - w->reserved)
         status = UPLOAD_TOO_LARGE;
     while (status == UPLOAD_OK && limits->all > 0 && u->bytes + u->pending + more > limits->all)
-        if (!collect_one(w->s, clock_seconds(CLOCK_REALTIME) - UPLOAD_GRACE_S))
+        if (!collect_one(w->s, clock_seconds(CLOCK_REALTIME), UPLOAD_GRACE_S))
             status = UPLOAD_NO_ROOM;
     if (status == UPLOAD_OK) {
         w->reserved += more;

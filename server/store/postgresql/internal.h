@@ -149,7 +149,7 @@ store_status postgresql_upload_named(store *s, const char *id, const char *of_jo
 store_status postgresql_upload_add(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
                                    bool *known);
 store_status postgresql_upload_forget(store *s, const char *id, const char *client, bool *gone);
-store_status postgresql_upload_idle(store *s, double before, upload_info *out);
+store_status postgresql_upload_idle(store *s, double now, double unused_s, upload_info *out);
 store_status postgresql_upload_total(store *s, int64_t *bytes);
 store_status postgresql_collect(store *s, int64_t *count); /* objects.c */
 store_status postgresql_try_write(store *s);

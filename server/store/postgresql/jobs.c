@@ -692,7 +692,7 @@ static store_status count_deleted(link_to *l, const PGresult *r, void *ctx)
 store_status postgresql_retain(store *base, const store_retention *limits, double now, int64_t *count)
 {
     void *args[] = {postgresql_of(base), count};
-    call c = {.sql = "SELECT job, client FROM uzawa.retain($1, $2, $3, $4)"};
+    call c = {.sql = "SELECT job, client FROM uzawa.retain(least($1, uzawa.moment()), $2, $3, $4)"};
     call_real(&c, now);
     call_real(&c, limits->keep_s);
     call_integer(&c, limits->keep_jobs);

@@ -97,11 +97,12 @@ static store_status read_idle(link_to *l, const PGresult *r, void *ctx)
     return cell_write(out->id, sizeof out->id, r, 0, 0) ? STORE_OK : STORE_ERROR;
 }
 
-store_status postgresql_upload_idle(store *base, double before, upload_info *out)
+store_status postgresql_upload_idle(store *base, double now, double unused_s, upload_info *out)
 {
-    call c = {.sql = "SELECT id, bytes FROM uzawa.upload WHERE used < $1::float8"
+    call c = {.sql = "SELECT id, bytes FROM uzawa.upload WHERE used < least($1::float8, uzawa.moment()) - $2::float8"
                      " AND NOT EXISTS (SELECT 1 FROM uzawa.upload_use WHERE upload = id) ORDER BY used LIMIT 1"};
-    call_real(&c, before);
+    call_real(&c, now);
+    call_real(&c, unused_s);
     return postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_idle, out);
 }
 

@@ -157,7 +157,7 @@ store_status sqlite_upload_named(store *s, const char *id, const char *of_job);
 store_status sqlite_upload_add(store *s, const char *id, const char *client, int64_t bytes, upload_info *out,
                                bool *known);
 store_status sqlite_upload_forget(store *s, const char *id, const char *client, bool *gone);
-store_status sqlite_upload_idle(store *s, double before, upload_info *out);
+store_status sqlite_upload_idle(store *s, double now, double unused_s, upload_info *out);
 store_status sqlite_upload_total(store *s, int64_t *bytes);
 store_status sqlite_try_write(store *s);
 int64_t sqlite_free_bytes(store *s);

@@ -119,13 +119,13 @@ store_status sqlite_upload_forget(store *base, const char *id, const char *clien
     return status;
 }
 
-store_status sqlite_upload_idle(store *base, double before, upload_info *out)
+store_status sqlite_upload_idle(store *base, double now, double unused_s, upload_info *out)
 {
     sqlite_store *s = sqlite_of(base);
     store_status status = STORE_NOT_FOUND;
     connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_IDLE_UPLOAD);
-    bind_real(&st, 1, before);
+    bind_real(&st, 1, now - unused_s);
     if (statement_row(&st)) {
         *out = (upload_info){.bytes = sqlite3_column_int64(st.stmt, 1)};
         snprintf(out->id, sizeof out->id, "%s", (const char *)sqlite3_column_text(st.stmt, 0));

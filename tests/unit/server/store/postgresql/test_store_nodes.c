@@ -211,6 +211,34 @@ TEST(an_end_that_is_sent_again_is_the_same)
 }
 
 /* The jobs of a daemon that was killed, at the start of the next one on its machine, or of that with its name. */
+/* Ends are told by the database's clock: what one daemon's shows makes nothing older. */
+TEST(a_daemon_whose_clock_is_wrong_deletes_nothing_for_it)
+{
+    const double year = 366.0 * 86400.0, now = clock_seconds(CLOCK_REALTIME);
+    pair two;
+    int64_t count = -1;
+    char id[33];
+    job j = {0};
+    upload_info upload;
+    if (!pair_begin(&two, 0.0))
+        return;
+    submit_body(two.a, 0, 0, id);
+    CHECK_INT(store_dismiss(two.a, id, &j.status), STORE_OK);
+    CHECK_INT(two.b->engine->retain(two.b, &(store_retention){.keep_s = 1000.0}, now + year, &count), STORE_OK);
+    CHECK_INT(count, 0);
+    CHECK_INT(store_get(two.a, id, &j), STORE_OK);
+    job_clear(&j);
+    run_sql(&two, "UPDATE uzawa.job SET finished = finished - 2000");
+    CHECK_INT(two.b->engine->retain(two.b, &(store_retention){.keep_s = 1000.0}, now + year, &count), STORE_OK);
+    CHECK_INT(count, 1);
+    run_sql(&two, "INSERT INTO uzawa.blob VALUES ('x', 0, true)");
+    run_sql(&two, "INSERT INTO uzawa.upload SELECT 'x', 1, uzawa.moment(), uzawa.moment()");
+    CHECK_INT(two.b->engine->upload_idle(two.b, now + year, 1000.0, &upload), STORE_NOT_FOUND);
+    run_sql(&two, "UPDATE uzawa.upload SET used = used - 2000");
+    CHECK_INT(two.b->engine->upload_idle(two.b, now + year, 1000.0, &upload), STORE_OK);
+    pair_end(&two);
+}
+
 TEST(jobs_of_a_process_that_is_no_more_are_taken_up)
 {
     pair two;
