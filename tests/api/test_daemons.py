@@ -345,6 +345,26 @@ def test_messages_that_stay_away_keep_no_job_waiting(s):
         runs.request("DELETE", f"/v1/jobs/{busy}")
 
 
+def test_a_database_that_stands_still_is_no_end_of_the_daemon(s):
+    """Who supervises it asks /healthz, and would restart what does not answer; other questions wait for 45 s."""
+    with daemons(s.build, 1) as ((a,), name), concurrent.futures.ThreadPoolExecutor(12) as pool:
+        def connections():
+            list(pool.map(lambda _: a.get("/v1/jobs"), range(24)))
+            return [int(row[0]) for row in SERVER.sql(name, "SELECT pid FROM pg_stat_activity WHERE application_name = 'uzawad'"
+                                                            " AND datname = current_database()")]
+        wait_until(lambda: len(connections()) >= 6)
+        stopped = [SERVER.process.pid, *connections()]  # nor is there a new one
+        try:
+            for pid in stopped:
+                os.kill(pid, signal.SIGSTOP)
+            check(a.request("GET", "/healthz", timeout=30).json["status"] == "store_unavailable")
+            expect(a.request("GET", "/metrics", timeout=60), 200)
+        finally:
+            for pid in stopped:
+                os.kill(pid, signal.SIGCONT)
+        wait_until(lambda: a.get("/healthz").json["status"] == "ok")
+
+
 def test_connections_that_are_cut_lose_nothing(s):
     with daemons(s.build, 2) as ((a, b), name), concurrent.futures.ThreadPoolExecutor(4) as pool:
         outcomes = collections.Counter()

@@ -71,7 +71,7 @@ static void forget_answers(link_to *l)
     l->n_answers = l->sent = l->asked = l->heard = l->n_parsing = 0;
     l->settings = SIZE_MAX;
     l->status = STORE_OK;
-    l->lost = l->passing = false;
+    l->lost = l->silent = l->passing = false;
 }
 
 void link_close(link_to *l)
@@ -193,10 +193,11 @@ static void fail_as_said(link_to *l, const PGresult *r)
 /* Waits until something can be read, or also written, and reads it. */
 static bool wait_for(link_to *l, bool write)
 {
-    const double until = clock_seconds(CLOCK_MONOTONIC) + SILENT_S;
+    const double until = clock_seconds(CLOCK_MONOTONIC) + l->patience_s;
     struct pollfd p = {.fd = PQsocket(l->pg), .events = (short)(POLLIN | (write ? POLLOUT : 0))};
     while (poll(&p, 1, 1000) <= 0)
         if (clock_seconds(CLOCK_MONOTONIC) > until) {
+            l->silent = true;
             lose(l, "it does not answer");
             return false;
         }
@@ -269,6 +270,7 @@ static bool send_one(link_to *l, const call *c)
     " set_config('idle_in_transaction_session_timeout', '30s', true)"
 static const char *const SETTINGS[] = {
     [LINK_READ] = NULL,
+    [LINK_GLANCE] = NULL,
     [LINK_DURABLE] = "SELECT " LIMITS ", CASE WHEN current_setting('synchronous_commit') = 'off'"
                      " THEN set_config('synchronous_commit', 'on', true) END",
     [LINK_LAZY] = "SELECT " LIMITS ", set_config('synchronous_commit', 'off', true)"};
@@ -276,6 +278,7 @@ static const char *const SETTINGS[] = {
 void link_begin(link_to *l, link_kind kind)
 {
     forget_answers(l);
+    l->patience_s = kind == LINK_GLANCE ? LINK_GLANCE_S : SILENT_S;
     if (!l->pg) {
         l->status = STORE_AWAY; /* the message is link_open's */
         l->lost = true;

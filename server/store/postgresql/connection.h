@@ -34,7 +34,9 @@ typedef struct {
     bool misled; /* it seemed so, and was not */
     store_status status; /* the first failure since link_begin */
     bool lost;           /* it failed in a way that leaves open what was carried out; it is closed when given back */
+    bool silent;         /* it was given up because the server did not answer */
     bool passing;        /* the failure is one that another try may not meet: a deadlock, a key that came meanwhile */
+    double patience_s;   /* for the server's silence */
     char message[LINK_CAUSE];
 } link_to;
 
@@ -67,9 +69,11 @@ void call_bytes(call *c, const void *data, size_t size);
 /* A transaction: begin, send..., end. */
 typedef enum {
     LINK_READ,    /* only reads */
+    LINK_GLANCE,  /* only reads, for who would rather know soon that there is no answer (LINK_GLANCE_S) */
     LINK_DURABLE, /* on disk when it ended */
     LINK_LAZY     /* may be lost with the server for a moment longer (engine.h: claim and renew) */
 } link_kind;
+#define LINK_GLANCE_S 5.0
 void link_begin(link_to *l, link_kind kind);
 void link_send(link_to *l, const call *c);
 /* STORE_OK: all of it was carried out; else nothing was, or l->lost. Answers stay until the next link_begin. Codes that

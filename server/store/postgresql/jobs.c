@@ -226,7 +226,7 @@ static void run_alone(postgresql_store *s, change *c)
         link_begin(l, LINK_DURABLE);
         send_change(s, l, c);
         c->status = end_transaction(l);
-        const bool again = tries < 4 && l->pg && (l->lost ? c->status == STORE_AWAY : l->passing);
+        const bool again = tries < 4 && l->pg && (l->lost ? c->status == STORE_AWAY && !l->silent : l->passing);
         if (c->status == STORE_OK)
             c->status = read_verdict(l, c);
         memcpy(c->message, l->message, sizeof c->message);

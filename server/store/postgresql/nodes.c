@@ -103,7 +103,7 @@ static store_status list(store *base, store_node **nodes, size_t *count)
                " factors, bytes, max_bytes, coalesce((SELECT string_agg(hex, ' ' ORDER BY hex) FROM (SELECT"
                " lpad(to_hex(body), 16, '0') AS hex FROM uzawa.holding WHERE holding.node = node.id) AS each), '')"
                " FROM uzawa.node ORDER BY 1, begun"};
-    const store_status status = postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_nodes, &a);
+    const store_status status = postgresql_do(postgresql_of(base), LINK_GLANCE, true, &c, read_nodes, &a);
     if (status != STORE_OK) {
         store_nodes_free(*nodes, *count);
         *nodes = NULL;

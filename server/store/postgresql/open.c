@@ -41,16 +41,23 @@ static void connect_link(postgresql_store *s, link_to *l)
     pthread_mutex_unlock(&s->links_lock);
 }
 
-link_to *postgresql_take(postgresql_store *s)
+/* NULL: none was free within this time. */
+static link_to *take_within(postgresql_store *s, double seconds)
 {
+    const double until = clock_seconds(CLOCK_MONOTONIC) + seconds;
     pthread_mutex_lock(&s->links_lock);
-    while (s->n_links_free == 0)
-        pthread_cond_wait(&s->link_free, &s->links_lock);
-    link_to *l = s->links_free[--s->n_links_free];
+    while (s->n_links_free == 0 && clock_wait(&s->link_free, &s->links_lock, until))
+        ;
+    link_to *l = s->n_links_free > 0 ? s->links_free[--s->n_links_free] : NULL;
     pthread_mutex_unlock(&s->links_lock);
-    if (!link_alive(l))
+    if (l && !link_alive(l))
         connect_link(s, l);
     return l;
+}
+
+link_to *postgresql_take(postgresql_store *s)
+{
+    return take_within(s, (double)INFINITY);
 }
 
 store_status postgresql_give(postgresql_store *s, link_to *l, store_status status)
@@ -74,11 +81,15 @@ store_status postgresql_do(postgresql_store *s, link_kind kind, bool repeat, con
                            void *ctx)
 {
     for (int tries = 1;; tries++) {
-        link_to *l = postgresql_take(s);
+        link_to *l = take_within(s, kind == LINK_GLANCE ? LINK_GLANCE_S : (double)INFINITY);
+        if (!l) {
+            store_set_message(&s->base, "no connection to the database was free");
+            return STORE_AWAY;
+        }
         link_begin(l, kind);
         link_send(l, c);
         store_status status = link_end(l);
-        const bool again = tries < 3 && ((repeat && l->lost && l->pg) || l->passing);
+        const bool again = tries < 3 && ((repeat && l->lost && !l->silent && l->pg) || l->passing);
         if (status == STORE_OK && read)
             status = read(l, l->answers[0], ctx);
         postgresql_give(s, l, status);
@@ -135,7 +146,7 @@ store *postgresql_open(const char *address, char *message, size_t size)
     }
     store_base_begin(&s->base, &STORE_POSTGRESQL);
     pthread_mutex_init(&s->links_lock, NULL);
-    pthread_cond_init(&s->link_free, NULL);
+    clock_condition(&s->link_free);
     pthread_mutex_init(&s->state_lock, NULL);
     batch_begin(&s->changes, postgresql_run_batch, s);
     for (int i = 0; i < STORE_LINKS; i++)

@@ -229,5 +229,5 @@ store_status postgresql_counts(store *base, int64_t counts[STORE_COUNTS])
                            " (SELECT name FROM (SELECT name, waiting FROM uzawa.share WHERE waiting > 0 UNION ALL"
                            " SELECT share, (coalesce(becomes, 9) = 0)::int - (coalesce(was, 9) = 0)::int"
                            " FROM uzawa.ledger) AS late GROUP BY name HAVING sum(waiting) > 0) AS shares"};
-    return postgresql_do(postgresql_of(base), LINK_READ, true, &c, read_counts, counts);
+    return postgresql_do(postgresql_of(base), LINK_GLANCE, true, &c, read_counts, counts);
 }
