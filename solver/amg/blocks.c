@@ -246,7 +246,21 @@ static bool find_pattern(uz_aggregates *mg, const uz_csc *K)
     return ok;
 }
 
-/* S: the diagonal becomes 1/2 to 4; 0 where it is not positive. */
+static uz_status fail_diagonal(int64_t j, uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not positive. "
+                   "Support the body so that it can't move freely, or check the signs of K.",
+                   (long long)j);
+}
+
+/* Of a diagonal entry; 0 where it is not positive. */
+static double scale_of(double own)
+{
+    return own > 0.0 ? ldexp(1.0, -ilogb(own) / 2) : 0.0;
+}
+
+/* S: the diagonal becomes 1/2 to 4. */
 typedef struct {
     double *scale;
     const uz_csc *K;
@@ -258,8 +272,7 @@ static void find_scales(void *ctx, int64_t begin, int64_t end)
     const uz_csc *K = x->K;
     for (int64_t j = begin; j < end; j++) {
         const int64_t q = K->ptr[j];
-        const bool positive = q < K->ptr[j + 1] && K->idx[q] == j && K->val[q] > 0.0;
-        x->scale[j] = positive ? ldexp(1.0, -ilogb(K->val[q]) / 2) : 0.0;
+        x->scale[j] = q < K->ptr[j + 1] && K->idx[q] == j ? scale_of(K->val[q]) : 0.0;
     }
 }
 
@@ -268,15 +281,20 @@ static uz_status find_scale(uz_aggregates *mg, const uz_csc *K, uz_error *err)
     uz_by_pieces(find_scales, &(scaling){mg->scale, K}, K->cols);
     for (int64_t j = 0; j < K->cols; j++)
         if (mg->scale[j] == 0.0)
-            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                           "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
-                           "positive. Support the body so that it can't move freely, or check the signs of K.",
-                           (long long)j);
+            return fail_diagonal(j, err);
     return UZ_OK;
 }
 
 /* Entries of a positive definite matrix are smaller than the diagonal's: 4, scaled. */
 #define ENTRY_MOST 4.0
+
+static uz_status fail_entry(int64_t i, int64_t j, uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is not positive definite: its entry of the dofs %lld and %lld (numbered from 0) is larger than "
+                   "their diagonal entries allow. Check the signs and units of K.",
+                   (long long)i, (long long)j);
+}
 
 /* Columns of K as the threads that share them see that: each entry has a place of its own. */
 typedef struct {
@@ -324,10 +342,7 @@ static uz_status fill(uz_aggregates *mg, const uz_csc *K, uz_error *err)
     uz_aside_share(fill_part, &x, x.parts);
     for (int part = 0; part < x.parts; part++)
         if (x.bad[part][0] >= 0)
-            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                           "K is not positive definite: its entry of the dofs %lld and %lld (numbered from 0) is "
-                           "larger than their diagonal entries allow. Check the signs and units of K.",
-                           (long long)x.bad[part][0], (long long)x.bad[part][1]);
+            return fail_entry(x.bad[part][0], x.bad[part][1], err);
     return UZ_OK;
 }
 
@@ -348,6 +363,84 @@ uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const u
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)K->cols);
     const uz_status status = find_scale(mg, K, err);
     return status == UZ_OK ? fill(mg, K, err) : status;
+}
+
+/* ---------------------------------------------------------------- from blocks, and back */
+
+/* Of the dofs of two nodes: their block becomes S times it times S, or that of the unit matrix. */
+static bool scale_block(double *block, const uz_aggregates *mg, const float *there, int64_t i, int64_t j, int b)
+{
+    bool good = true;
+    for (int r = 0; r < b; r++)
+        for (int c = 0; c < b; c++) {
+            const int64_t row = i * b + r, column = j * b + c;
+            double *value = &block[r * b + c];
+            if (there[row] > 0.0F && there[column] > 0.0F)
+                *value *= mg->scale[row] * mg->scale[column];
+            else
+                *value = row == column ? 1.0 : 0.0;
+            good = good && fabs(*value) <= ENTRY_MOST;
+        }
+    return good;
+}
+
+uz_status uz_blocks_take(uz_aggregates *mg, uz_blocks *from, const float *there, uz_error *err)
+{
+    const int b = from->b;
+    const int64_t nodes = from->nodes, size = (int64_t)b * b, count = from->ptr[nodes];
+    uz_blocks *A = &mg->level[0].A;
+    *A = (uz_blocks){.nodes = nodes,
+                     .b = b,
+                     .ptr = uz_alloc(nodes + 1, sizeof *A->ptr),
+                     .idx = uz_alloc(count, sizeof *A->idx),
+                     .off = from->off,
+                     .diag = uz_alloc(nodes * size + 4, sizeof *A->diag)};
+    from->off = NULL;
+    mg->shift = uz_width(b) == 8 ? 3 : 2;
+    mg->slot = uz_alloc(nodes * b, sizeof *mg->slot);
+    mg->scale = uz_alloc(nodes * b, sizeof *mg->scale);
+    if (!A->ptr || !A->idx || !A->diag || !mg->slot || !mg->scale)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)(nodes * b));
+    memcpy(A->ptr, from->ptr, (size_t)(nodes + 1) * sizeof *A->ptr);
+    memcpy(A->idx, from->idx, (size_t)count * sizeof *A->idx);
+    memcpy(A->diag, from->diag, (size_t)(nodes * size) * sizeof *A->diag);
+    memset(A->diag + nodes * size, 0, 4 * sizeof *A->diag);
+    for (int64_t j = 0; j < nodes * b; j++) {
+        mg->slot[j] = (j / b << mg->shift) + j % b;
+        mg->scale[j] = there[j] > 0.0F ? scale_of(A->diag[j / b * size + j % b * b + j % b]) : 1.0;
+        if (mg->scale[j] == 0.0)
+            return fail_diagonal(j, err);
+    }
+    for (int64_t i = 0; i < nodes; i++) {
+        double *own = A->diag + i * size;
+        for (int r = 0; r < b; r++) /* as sums of both triangles are rounded, these differ */
+            for (int c = 0; c < r; c++)
+                own[c * b + r] = own[r * b + c];
+        if (!scale_block(own, mg, there, i, i, b))
+            return fail_entry(i * b, i * b, err);
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            if (!scale_block(A->off + e * size, mg, there, i, A->idx[e], b))
+                return fail_entry(i * b, A->idx[e] * (int64_t)b, err);
+    }
+    return UZ_OK;
+}
+
+uz_status uz_blocks_give_back(uz_blocks *to, const uz_aggregates *mg, uz_error *err)
+{
+    const uz_level *level = &mg->level[0];
+    const int b = to->b;
+    const int64_t size = (int64_t)b * b;
+    double room[UZ_MODES_MOST * UZ_MODES_MOST];
+    to->off = uz_alloc_zero(to->ptr[to->nodes] * size + 4, sizeof *to->off);
+    if (!to->off)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid on %lld dofs", (long long)(to->nodes * b));
+    for (int64_t i = 0; i < to->nodes; i++)
+        for (int64_t e = to->ptr[i]; e < to->ptr[i + 1]; e++) {
+            const double *block = uz_level_block(room, level, false, e, size);
+            for (int64_t q = 0; q < size; q++)
+                to->off[e * size + q] = block[q] / (mg->scale[i * b + q / b] * mg->scale[to->idx[e] * b + q % b]);
+        }
+    return UZ_OK;
 }
 
 /* -------------------------------------------------------------------- to a matrix */

@@ -386,26 +386,18 @@ static int32_t *find_ends(const uz_blocks *A, const int32_t *node_of_group, cons
     return NULL;
 }
 
-static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, const uz_team *team,
-                       size_t memory_limit, const uz_stop *stop, uz_error *err)
+/* All that follows from level 0. ends: of its nodes, or NULL: it is coarsened by aggregates at once. */
+static uz_status make_levels(uz_aggregates *mg, const int32_t *ends, const uz_modes *modes, const uz_team *team,
+                             size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
-    int32_t *node_of_group = uz_alloc(modes->n_nodes, sizeof *node_of_group);
+    const int first = ends ? 1 : 0; /* level with aggregates */
     float *of_level = NULL;
     bool done = false;
-    uz_status status =
-        node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, team == NULL, err) : fail_memory(K->cols, err);
-    bool no_memory = false;
-    int32_t *ends = status == UZ_OK ? find_ends(&mg->level[0].A, node_of_group, modes, &no_memory) : NULL;
-    const int first = ends ? 1 : 0; /* level with aggregates */
-    free(node_of_group);
-    if (no_memory)
-        status = fail_memory(K->cols, err);
-    if (status == UZ_OK)
-        status = uz_level_round(&mg->level[0], err);
+    uz_status status = uz_level_round(&mg->level[0], err);
     if (status == UZ_OK) /* what is left of K: for the next level, and for products afterwards */
         uz_level_part(&mg->level[0]);
     if (status == UZ_OK && !(of_level = scale_modes(mg, modes)))
-        status = fail_memory(K->cols, err);
+        status = fail_memory(mg->base.n, err);
     while (status == UZ_OK && !done) {
         const int l = mg->base.levels - 1;
         uz_level *level = &mg->level[l];
@@ -424,9 +416,44 @@ static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes
             status = uz_fail(err, UZ_ERR_LIMIT, "K", "the levels of the multigrid take more than the %zu bytes allowed",
                              memory_limit);
     }
-    free(ends);
     free(of_level);
     return status;
+}
+
+static uz_status build(uz_aggregates *mg, const uz_csc *K, const uz_modes *modes, const uz_team *team,
+                       size_t memory_limit, const uz_stop *stop, uz_error *err)
+{
+    int32_t *node_of_group = uz_alloc(modes->n_nodes, sizeof *node_of_group);
+    uz_status status =
+        node_of_group ? uz_blocks_of_matrix(mg, node_of_group, K, modes, team == NULL, err) : fail_memory(K->cols, err);
+    bool no_memory = false;
+    int32_t *ends = status == UZ_OK ? find_ends(&mg->level[0].A, node_of_group, modes, &no_memory) : NULL;
+    free(node_of_group);
+    if (no_memory)
+        status = fail_memory(K->cols, err);
+    if (status == UZ_OK)
+        status = make_levels(mg, ends, modes, team, memory_limit, stop, err);
+    free(ends);
+    return status;
+}
+
+/* Without a level; NULL: no memory. */
+static uz_aggregates *make_empty(int64_t n)
+{
+    uz_aggregates *mg = uz_alloc_zero(1, sizeof *mg);
+    if (mg)
+        mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
+    return mg;
+}
+
+/* Only the last level needs its matrix again. */
+static void drop_matrices(uz_aggregates *mg)
+{
+    for (int l = 1; l + 1 < mg->base.levels; l++) {
+        free(mg->level[l].A.off);
+        free(mg->level[l].A.diag);
+        mg->level[l].A.off = mg->level[l].A.diag = NULL;
+    }
 }
 
 uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const uz_team *team,
@@ -437,24 +464,49 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     if (n >= INT32_MAX)
         return uz_fail(err, UZ_ERR_UNSUPPORTED, "K", "matrix_free holds up to 2^31 - 2 dofs, these are %lld",
                        (long long)n);
-    uz_aggregates *mg = uz_alloc_zero(1, sizeof *mg);
+    uz_aggregates *mg = make_empty(n);
     if (!mg)
         return fail_memory(n, err);
-    mg->base = (uz_multigrid){.kind = &uz_aggregates_kind, .n = n, .levels = 1};
     uz_status status = n > ALONE ? build(mg, K, modes, team, memory_limit, stop, err) : UZ_OK;
     if (status == UZ_OK)
         status = factor_last(mg, K, memory_limit, stop, err);
-    for (int l = 1; l + 1 < mg->base.levels; l++) { /* only the last level needs them again */
-        free(mg->level[l].A.off);
-        free(mg->level[l].A.diag);
-        mg->level[l].A.off = mg->level[l].A.diag = NULL;
-    }
+    drop_matrices(mg);
     if (status == UZ_OK)
         status = bound_by_diagonal(&mg->base.most, K, err);
     if (status == UZ_OK) {
         /* Half of FLT_EPSILON of K's absolute values is rounded off, twice that with what is on the way; the norm of
          * D^-1/2 |K| D^-1/2 is at most the largest row sum. */
         mg->base.rough = FLT_EPSILON * sqrt(mg->base.most);
+        mg->base.bytes = count_bytes(mg);
+        *out = &mg->base;
+    } else {
+        uz_aggregates_kind.free(&mg->base);
+    }
+    return status;
+}
+
+uz_status uz_multigrid_of_blocks(uz_multigrid **out, uz_blocks *A, const float *there, const uz_modes *modes,
+                                 const uz_team *team, uz_error *err)
+{
+    const int64_t n = A->nodes * A->b;
+    *out = NULL;
+    if (n <= ALONE)
+        return UZ_OK;
+    uz_aggregates *mg = make_empty(n);
+    if (!mg)
+        return fail_memory(n, err);
+    uz_status status = uz_blocks_take(mg, A, there, err);
+    if (status == UZ_OK)
+        status = make_levels(mg, NULL, modes, team, 0, NULL, err);
+    const bool alone = status == UZ_OK && mg->base.levels == 1;
+    if (alone)
+        status = uz_blocks_give_back(A, mg, err);
+    else if (status == UZ_OK)
+        status = factor_last(mg, NULL, 0, NULL, err);
+    if (status == UZ_OK && !alone) {
+        uz_free_all(mg->level[0].off_rest.value, mg->level[0].diag_rest.value);
+        mg->level[0].off_rest.value = mg->level[0].diag_rest.value = NULL;
+        drop_matrices(mg);
         mg->base.bytes = count_bytes(mg);
         *out = &mg->base;
     } else {

@@ -192,6 +192,17 @@ bool uz_room_for_lanes(uz_multigrid_room *room, const uz_multigrid *mg);
 uz_status uz_blocks_of_matrix(uz_aggregates *mg, int32_t *node_of_group, const uz_csc *K, const uz_modes *modes,
                               bool parted, uz_error *err);
 
+/* The same of a matrix in blocks, whose numbers off the diagonal are taken, also on failure; dofs that are not there
+ * (n) become those of the unit matrix. */
+uz_status uz_blocks_take(uz_aggregates *mg, uz_blocks *from, const float *there, uz_error *err);
+/* Those numbers, which level 0 has by now in parts, come back. */
+uz_status uz_blocks_give_back(uz_blocks *to, const uz_aggregates *mg, uz_error *err);
+/* uz_multigrid_create of blocks, which are taken so: without a limit of memory, and without what a solve asks of K
+ * itself, `most`, `rough` and what single precision has left of level 0. *out NULL: they are better factored as they
+ * are, and have their numbers, about. */
+uz_status uz_multigrid_of_blocks(uz_multigrid **out, uz_blocks *A, const float *there, const uz_modes *modes,
+                                 const uz_team *team, uz_error *err);
+
 /* Column by column, lower triangle; dofs without an inverse become those of the unit matrix. */
 uz_status uz_blocks_to_columns(uz_csc *out, const uz_blocks *A, const float *inverse, uz_error *err);
 

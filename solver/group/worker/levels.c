@@ -540,28 +540,24 @@ static uz_team team_of(const spread_system *s)
 /* A function on held dofs but for so much of its energy is left out. */
 #define LOST 1e-5
 
-/* A->off, which were freed. */
-static void take_back(uz_blocks *A, const uz_csc *columns)
+/* A small matrix, or one that can't be coarsened, keeps its numbers. */
+static uz_status factor_whole(uz_multigrid **made, uz_blocks *A, const float *there, const uz_modes *modes,
+                              const uz_team *team, uz_error *err)
 {
-    const int64_t b = A->b;
-    A->off = new_zeros(A->ptr[A->nodes] * b * b + 4, sizeof *A->off);
-    for (int64_t j = 0; j < columns->cols; j++)
-        for (int64_t e = columns->ptr[j]; e < columns->ptr[j + 1]; e++) {
-            const int64_t i = columns->idx[e];
-            if (i / b > j / b)
-                A->off[(uz_blocks_find(A, i / b, (int32_t)(j / b)) * b + i % b) * b + j % b] = columns->val[e];
-        }
+    uz_csc columns = {0};
+    must(uz_blocks_to_columns(&columns, A, there, err), err);
+    const uz_status status = uz_multigrid_create(made, &columns, modes, team, 0, NULL, err);
+    uz_csc_clear(&columns);
+    return status;
 }
 
 /* Of the next matrix, or of what holding dofs leaves of it. NULL where rounding has made that indefinite. Numbers off
- * the diagonal are not A's any more, whose room the levels take, unless there is one level, which held dofs make anew.
- */
+ * the diagonal are not A's any more, as level 0 has them, unless there is one level, which held dofs make anew. */
 static uz_multigrid *make_coarse(const spread_system *s, uz_blocks *A)
 {
     const int k = s->k;
     const int64_t n = A->nodes * k;
     float *there = new_zeros(n, sizeof *there);
-    uz_csc columns = {0};
     uz_modes modes = {.count = k, .n_nodes = A->nodes, .value = s->modes, .strong = 0.5 * s->strong};
     uz_multigrid *made = NULL;
     uz_error err = {0};
@@ -571,16 +567,12 @@ static uz_multigrid *make_coarse(const spread_system *s, uz_blocks *A)
         modes.node[i] = (int32_t)(i / k);
         there[i] = A->diag[at] > LOST * s->next.diag[at] ? 1.0F : 0.0F;
     }
-    must(uz_blocks_to_columns(&columns, A, there, &err), &err);
-    free(A->off);
-    A->off = NULL;
     const uz_team team = team_of(s);
-    const uz_status status = uz_multigrid_create(&made, &columns, &modes, &team, 0, NULL, &err);
+    uz_status status = uz_multigrid_of_blocks(&made, A, there, &modes, &team, &err);
+    if (status == UZ_OK && !made)
+        status = factor_whole(&made, A, there, &modes, &team, &err);
     if (status != UZ_OK && status != UZ_ERR_NOT_SPD)
         end_group(err.message);
-    if (made && made->levels == 1)
-        take_back(A, &columns);
-    uz_csc_clear(&columns);
     free(modes.node);
     free(there);
     return made;

@@ -770,6 +770,80 @@ TEST(a_multigrid_by_two)
     brick_free(&b);
 }
 
+/* Of a body's level 0, with unit rows where nodes have fewer dofs. weak: blocks lose so much, and tie no nodes. */
+static void compare_blocks(const pair *p, double weak)
+{
+    uz_blocks whole, A;
+    uz_csc columns = {0};
+    uz_multigrid *made[2];
+    uz_error err = {0};
+    half_of(&whole, p);
+    const int64_t n = whole.nodes * whole.b, size = (int64_t)whole.b * whole.b, count = whole.ptr[whole.nodes] * size;
+    uz_modes modes = {.count = 3, .n_nodes = whole.nodes, .strong = 0.08};
+    float *there = calloc((size_t)n, sizeof *there);
+    modes.node = calloc((size_t)n, sizeof *modes.node);
+    modes.value = calloc((size_t)(3 * n), sizeof *modes.value);
+    for (int64_t j = 0; j < n; j++) {
+        double *own = &whole.diag[j / 3 * size + j % 3 * 4];
+        modes.node[j] = (int32_t)(j / 3);
+        modes.value[3 * j + j % 3] = 1.0F;
+        there[j] = *own > 0.0 ? 1.0F : 0.0F;
+        *own *= j % 3 == 0 ? 0x1p20 : 1.0; /* scales differ */
+    }
+    A = whole;
+    A.off = calloc((size_t)count + 4, sizeof *A.off);
+    for (int64_t e = 0; e < count; e++)
+        A.off[e] = weak * whole.off[e];
+    memcpy(whole.off, A.off, (size_t)count * sizeof *A.off);
+    CHECK_INT(uz_blocks_to_columns(&columns, &A, there, &err), UZ_OK);
+    CHECK_INT(uz_multigrid_create(&made[0], &columns, &modes, NULL, 0, NULL, &err), UZ_OK);
+    CHECK_INT(uz_multigrid_of_blocks(&made[1], &A, there, &modes, NULL, &err), UZ_OK);
+    CHECK((made[1] == NULL) == (made[0]->levels == 1) && (made[1] == NULL) == (A.off != NULL));
+    double most = 0.0, off = 0.0;
+    for (int64_t e = 0; A.off && e < count; e++) {
+        most = fmax(most, fabs(whole.off[e]));
+        off = fmax(off, fabs(A.off[e] - whole.off[e]));
+    }
+    CHECK_MSG(off <= 0x1p-34 * most, "%g of %g", off, most); /* 2^-55 of the largest, as scaled by up to 2^10 twice */
+    if (made[1]) {
+        double *r = random_vector(n, 5), *z[2] = {vector(n), vector(n)};
+        for (int k = 0; k < 2; k++) {
+            size_t bytes;
+            uz_multigrid_room *room = made[k]->kind->room(made[k], &bytes);
+            CHECK_INT(uz_multigrid_apply(made[k], &columns, room, z[k], r, &err), UZ_OK);
+            made[k]->kind->free_room(room);
+        }
+        CHECK(memcmp(z[0], z[1], (size_t)n * sizeof *r) == 0 && made[0]->bytes > made[1]->bytes);
+        free(r);
+        free(z[0]);
+        free(z[1]);
+    }
+    uz_multigrid_free(made[0]);
+    uz_multigrid_free(made[1]);
+    uz_csc_clear(&columns);
+    free(modes.node);
+    free(modes.value);
+    free(there);
+    free(A.off);
+    free(whole.off);
+    free(whole.diag);
+}
+
+/* A matrix in blocks gives the multigrid of its columns to the last bit, or stays as it was. */
+TEST(blocks_are_taken_as_they_are)
+{
+    brick b = brick_make((int64_t[]){11, 9, 7}, (double[]){1, 1, 1}, 0.3, true);
+    pair p;
+    uz_modes modes;
+    uz_error err = {0};
+    CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK(open_pair(&p, &b.K, &modes, &err));
+    compare_blocks(&p, 1.0);
+    compare_blocks(&p, 1e-9);
+    close_pair(&p);
+    brick_free(&b);
+}
+
 TEST(memory_is_bounded)
 {
     brick b = brick_make((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3, true);
