@@ -287,15 +287,11 @@ static void subtract_numbers(void *ctx, int64_t begin, int64_t end)
 }
 
 /* The level without what it loses, in arrays of its own. lost (nodes): rows of `loss` that are not 0; NULL: any. */
-static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss, const bool *lost, size_t *bytes)
+static bool subtract_off(uz_level *own, const uz_level *level, const uz_blocks *loss, const bool *lost)
 {
-    const int b = level->A.b;
-    const int64_t size = (int64_t)b * b, n = level->A.nodes * b, off = level->A.ptr[level->A.nodes] * size,
-                  diag = level->A.nodes * size;
+    const int64_t size = (int64_t)level->A.b * level->A.b, off = level->A.ptr[level->A.nodes] * size;
     own->off = uz_alloc(off + 8, sizeof *own->off);
-    own->diag = uz_alloc(diag + 8, sizeof *own->diag);
-    own->inverse = uz_alloc(n, sizeof *own->inverse);
-    if (!own->off || !own->diag || !own->inverse)
+    if (!own->off)
         return false;
     if (!lost) {
         uz_by_pieces(subtract_numbers, &(difference){own->off, level->off, loss->off}, off);
@@ -306,14 +302,24 @@ static bool subtract(uz_level *own, const uz_level *level, const uz_blocks *loss
                 subtract_numbers(&(difference){own->off, level->off, loss->off}, level->A.ptr[i] * size,
                                  level->A.ptr[i + 1] * size);
     }
-    uz_by_pieces(subtract_numbers, &(difference){own->diag, level->diag, loss->diag}, diag);
     memset(own->off + off, 0, 8 * sizeof *own->off);
+    return true;
+}
+
+static bool subtract_diag(uz_level *own, const uz_level *level, const uz_blocks *loss)
+{
+    const int b = level->A.b;
+    const int64_t size = (int64_t)b * b, n = level->A.nodes * b, diag = level->A.nodes * size;
+    own->diag = uz_alloc(diag + 8, sizeof *own->diag);
+    own->inverse = uz_alloc(n, sizeof *own->inverse);
+    if (!own->diag || !own->inverse)
+        return false;
+    uz_by_pieces(subtract_numbers, &(difference){own->diag, level->diag, loss->diag}, diag);
     memset(own->diag + diag, 0, 8 * sizeof *own->diag);
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = i / b * size + i % b * b + i % b;
         own->inverse[i] = own->diag[at] > (float)LOST * level->diag[at] ? 1.0F / own->diag[at] : 0.0F;
     }
-    *bytes += 4 * (size_t)(off + diag + n);
     return true;
 }
 
@@ -370,9 +376,17 @@ void uz_release_levels(uz_multigrid_room *room)
     room->coarsest = NULL;
 }
 
-/* room->own from level `from` on, not the last, whose loss stands in `first`; lost: see subtract. */
+static size_t own_bytes(const uz_level *level)
+{
+    const size_t b = (size_t)level->A.b, nodes = (size_t)level->A.nodes, blocks = (size_t)level->A.ptr[nodes];
+    return 4 * (b * b * (blocks + nodes) + b * nodes);
+}
+
+/* room->own from level `from` on, not the last, whose loss stands in `first`; lost: see subtract_off. apart: the blocks
+ * that this level has left are the caller's affair. */
 static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from, const uz_blocks *first,
-                      const bool *lost, size_t *bytes, const uz_team *team, const uz_stop *stop, uz_error *err)
+                      const bool *lost, bool apart, size_t *bytes, const uz_team *team, const uz_stop *stop,
+                      uz_error *err)
 {
     uz_blocks loss = *first;
     uz_status status = UZ_OK;
@@ -391,8 +405,12 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
             }
             loss = next;
         }
-        if (status == UZ_OK && !subtract(&room->own[l], &mg->level[l], &loss, l == from ? lost : NULL, bytes))
+        if (status == UZ_OK && !(l == from && apart) &&
+            !subtract_off(&room->own[l], &mg->level[l], &loss, l == from ? lost : NULL))
             status = fail_memory(mg->base.n, err);
+        if (status == UZ_OK && !subtract_diag(&room->own[l], &mg->level[l], &loss))
+            status = fail_memory(mg->base.n, err);
+        *bytes += own_bytes(&mg->level[l]);
     }
     if (status == UZ_OK)
         status = factor(room, &mg->level[mg->base.levels - 1], &loss, stop ? stop->hooks : NULL, err);
@@ -405,7 +423,7 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
     return status;
 }
 
-uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, const bool *lost,
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blocks *loss, const bool *lost, bool apart,
                        const uz_team *team, uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
@@ -423,7 +441,7 @@ uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *base, uz_blo
         }
     }
     uz_release_levels(room);
-    return lose(room, mg, 0, loss, lost, &bytes, team, NULL, err);
+    return lose(room, mg, 0, loss, lost, apart, &bytes, team, NULL, err);
 }
 
 uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const bool *held, size_t *bytes,
@@ -443,7 +461,7 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
     if (status == UZ_OK && (!init_loss(&loss, &mg->level[1]) || !uz_level_loss(&loss, finest, inverse)))
         status = fail_memory(mg->base.n, err);
     if (status == UZ_OK)
-        status = lose(room, mg, 1, &loss, NULL, bytes, NULL, stop, err);
+        status = lose(room, mg, 1, &loss, NULL, false, bytes, NULL, stop, err);
     free(loss.off);
     free(loss.diag);
     return status;

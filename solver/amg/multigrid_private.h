@@ -110,8 +110,9 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
 void uz_release_levels(uz_multigrid_room *room);
 /* Less of the matrix that the multigrid was made of, K, which had `b` dofs for each node, in order: loss, in the places
  * of its level 0, which is scaled as that is. lost (nodes): rows of `loss` that are not 0; NULL: any. More levels than
- * one. The room is for K - loss then, until it is told again. */
-uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, const bool *lost,
+ * one. The room is for K - loss then, until it is told again; apart: but for what level 0 has off the diagonal, which
+ * the caller keeps himself. */
+uz_status uz_hold_loss(uz_multigrid_room *room, const uz_multigrid *mg, uz_blocks *loss, const bool *lost, bool apart,
                        const uz_team *team, uz_error *err);
 
 /* Vectors of a level have `width` numbers for each node; where two systems are solved at once, in two lanes, those of

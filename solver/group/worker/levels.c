@@ -586,7 +586,7 @@ static void set_coarse(variant *v, uz_multigrid *made, const neighbours *near)
     if (made && !(v->room && uz_room_for_lanes(v->room, made)))
         end_group("no memory");
     if (made)
-        shared_init(&v->shared, made, v->room, near);
+        shared_init(&v->shared, made, v->room, near, NULL, NULL);
 }
 
 /* HELD may share WHOLE's multigrid. */
@@ -716,8 +716,8 @@ static void lose(spread_system *s, variant *v, const bool *lost)
             end_group("no memory");
         v->base = whole->base;
         const uz_team team = team_of(s);
-        must(uz_hold_loss(v->room, v->base, &s->loss, lost, &team, &err), &err);
-        shared_init(&v->shared, v->base, v->room, &s->near);
+        must(uz_hold_loss(v->room, v->base, &s->loss, lost, whole->shared.divided, &team, &err), &err);
+        shared_init(&v->shared, v->base, v->room, &s->near, &s->loss, lost);
         return;
     }
     uz_blocks A = zeros_like(&s->next);

@@ -9,11 +9,30 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A level, and what it has lost in some of its rows; NULL: nothing. */
+typedef struct {
+    const uz_level *level;
+    const uz_blocks *loss;
+    const bool *lost;
+} reduced;
+
+/* Block e, of row i. */
+static void take_block(float *to, const reduced *of, int64_t i, int64_t e, bool transposed)
+{
+    const int b = of->level->A.b;
+    const float *whole = of->level->off + e * b * b;
+    const double *lost = of->lost && of->lost[i] ? of->loss->off + e * b * b : NULL;
+    for (int r = 0; r < b; r++)
+        for (int c = 0; c < b; c++)
+            to[transposed ? c * b + r : r * b + c] =
+                lost ? (float)((double)whole[r * b + c] - lost[r * b + c]) : whole[r * b + c];
+}
+
 /* Blocks (i, j) of the own nodes i with others' nodes j, whichever triangle they stand in: two passes, the first of
  * which counts. */
-static void list_outside(shared_level *own, const uz_level *level, bool fill)
+static void list_outside(shared_level *own, const reduced *of, bool fill)
 {
-    const uz_blocks *A = &level->A;
+    const uz_blocks *A = &of->level->A;
     const int b = A->b;
     int64_t *next = new_zeros(own->end - own->begin + 1, sizeof *next);
     for (int64_t i = 0; fill && i < own->end - own->begin; i++)
@@ -31,16 +50,14 @@ static void list_outside(shared_level *own, const uz_level *level, bool fill)
             }
             const int64_t at = next[row]++;
             own->outside_idx[at] = (int32_t)(has_i ? j : i);
-            for (int r = 0; r < b; r++)
-                for (int c = 0; c < b; c++)
-                    own->outside[(at * b + r) * b + c] = level->off[e * b * b + (has_i ? r * b + c : c * b + r)];
+            take_block(own->outside + at * b * b, of, i, e, !has_i);
         }
     free(next);
 }
 
-static void copy_own_rows(shared_level *own, const uz_level *level)
+static void copy_own_rows(shared_level *own, const reduced *of)
 {
-    const uz_blocks *A = &level->A;
+    const uz_blocks *A = &of->level->A;
     uz_level *to = &own->level;
     const int64_t nodes = own->end - own->begin, size = (int64_t)A->b * A->b;
     int64_t count = 0;
@@ -53,13 +70,14 @@ static void copy_own_rows(shared_level *own, const uz_level *level)
     to->A.idx = new_zeros(count, sizeof *to->A.idx);
     to->off = new_zeros(count * size + 8, sizeof *to->off);
     to->diag = new_zeros(nodes * size + 8, sizeof *to->diag);
-    memcpy(to->diag, level->diag + own->begin * size, (size_t)(nodes * size) * sizeof *to->diag);
+    memcpy(to->diag, of->level->diag + own->begin * size, (size_t)(nodes * size) * sizeof *to->diag);
     count = 0;
-    for (int64_t e = A->ptr[own->begin]; e < A->ptr[own->end]; e++)
-        if (A->idx[e] >= own->begin) {
-            to->A.idx[count] = (int32_t)(A->idx[e] - own->begin);
-            memcpy(to->off + count++ * size, level->off + e * size, (size_t)size * sizeof *to->off);
-        }
+    for (int64_t i = own->begin; i < own->end; i++)
+        for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++)
+            if (A->idx[e] >= own->begin) {
+                to->A.idx[count] = (int32_t)(A->idx[e] - own->begin);
+                take_block(to->off + count++ * size, of, i, e, false);
+            }
 }
 
 /* Dofs that are not there stay so. */
@@ -80,15 +98,16 @@ static void add_sums(shared_level *own, const float *inverse)
         }
 }
 
-void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near)
+void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near,
+                 const uz_blocks *loss, const bool *lost)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
     *own = (shared_level){.size = near->size};
     if (near->size == 1 || base->levels == 1)
         return;
     uz_level level = mg->level[0];
-    if (room->own[0].off) {
-        level.off = room->own[0].off;
+    const reduced of = {&level, loss, lost};
+    if (lost) {
         level.diag = room->own[0].diag;
         level.inverse = room->own[0].inverse;
     }
@@ -104,14 +123,14 @@ void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid
     own->begin = own->first[0][near->rank] / width;
     own->end = own->begin + own->count[0][near->rank] / width;
     own->outside_ptr = new_zeros(own->end - own->begin + 1, sizeof *own->outside_ptr);
-    list_outside(own, &level, false);
+    list_outside(own, &of, false);
     for (int64_t i = 0; i < own->end - own->begin; i++)
         own->outside_ptr[i + 1] += own->outside_ptr[i];
     const int64_t blocks = own->outside_ptr[own->end - own->begin];
     own->outside_idx = new_zeros(blocks, sizeof *own->outside_idx);
     own->outside = new_zeros(blocks * b * b, sizeof *own->outside);
-    list_outside(own, &level, true);
-    copy_own_rows(own, &level);
+    list_outside(own, &of, true);
+    copy_own_rows(own, &of);
     add_sums(own, level.inverse);
     own->level.ptr = level.ptr + own->begin; /* borrowed, as are the next two */
     own->level.block = level.block;

@@ -66,7 +66,9 @@ typedef struct {
     int32_t *outside_idx;     /* which, */
     float *outside, *sum;     /* the blocks, and their absolute sums, b for each node */
 } shared_level;
-void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near);
+/* loss, lost: as uz_hold_loss has them, after that; NULL: nothing is. */
+void shared_init(shared_level *own, const uz_multigrid *base, const uz_multigrid_room *room, const neighbours *near,
+                 const uz_blocks *loss, const bool *lost);
 void shared_clear(shared_level *own);
 /* z = M^-1 z, vectors of the level as uz_level_step has them. */
 void shared_apply(const shared_level *own, const uz_multigrid *base, uz_multigrid_room *room, float *z, int lanes);

@@ -637,7 +637,7 @@ TEST(a_loss_of_the_matrix)
     CHECK(p.info.levels > 1);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, before, r, &err) == UZ_OK);
     half_of(&half, &p);
-    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, NULL, NULL, &err) == UZ_OK);
+    CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, NULL, false, NULL, &err) == UZ_OK);
     free(half.off);
     free(half.diag);
     CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, after, r, &err) == UZ_OK);
@@ -670,7 +670,7 @@ TEST(a_loss_of_some_rows)
         memset(half.diag + some * size, 0, (size_t)((half.nodes - some) * size) * sizeof *half.diag);
         for (int64_t i = 0; i < some; i++)
             lost[i] = true;
-        CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, says ? lost : NULL, NULL, &err) == UZ_OK);
+        CHECK(uz_hold_loss(p.cg.room, p.amg->mg, &half, says ? lost : NULL, false, NULL, &err) == UZ_OK);
         CHECK(uz_multigrid_apply(p.amg->mg, &p.K, p.cg.room, says ? told : found, r, &err) == UZ_OK);
         free(half.off);
         free(half.diag);
@@ -720,7 +720,7 @@ static void *make_in_team(void *arg)
     uz_multigrid_room *room = mg->kind->room(mg, &bytes);
     CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[0], x->r, &err) == UZ_OK);
     half_of(&half, x->p);
-    CHECK(uz_hold_loss(room, mg, &half, NULL, &team, &err) == UZ_OK);
+    CHECK(uz_hold_loss(room, mg, &half, NULL, false, &team, &err) == UZ_OK);
     free(half.off);
     free(half.diag);
     CHECK(uz_multigrid_apply(mg, &x->p->K, room, x->z[1], x->r, &err) == UZ_OK);
