@@ -215,10 +215,15 @@ uz_status uz_amg_of(uz_amg **out, uz_multigrid *mg, const uz_csc *K, int patienc
 /* The same where K is known to be definite, as that of a body is by its assembly: without bounds, which uz_amg_probe
  * finds then. */
 uz_status uz_amg_of_definite(uz_amg **out, uz_multigrid *mg, uz_error *err);
+typedef struct uz_amg_trials uz_amg_trials;
 /* Finds info.least by solves with K that are checked here, so that what is certified by it needs no word of the program
  * that holds M, whose kind has `solve`; and a guess at info.lambda, where there is none yet. UNSUPPORTED: the solves
  * are not those of K, or too rough. NOT_SPD: they show that K is not definite. */
-uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_hooks *hooks, uz_error *err);
+uz_status uz_amg_probe(uz_amg *amg, uz_amg_trials *trials, double rounding, const uz_hooks *hooks, uz_error *err);
+/* Room for these solves, and the right-hand sides of the first of them: of K alone, which is kept. NULL: no memory. Of
+ * one probe. */
+uz_amg_trials *uz_amg_draw(const uz_csc *K);
+void uz_amg_trials_free(uz_amg_trials *trials); /* NULL is fine */
 /* info.rounding, which uz_amg_probe is given: of K alone. */
 uz_status uz_amg_rounding(double *rounding, const uz_csc *K, uz_error *err);
 /* With smoothed aggregates. Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD and

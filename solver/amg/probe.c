@@ -87,22 +87,23 @@ enum { TIGHTENED_MOST = 3 };
 
 /* What a pair of trials needs, n numbers for each of them, and what came of each. A trial's own numbers are found by a
  * thread: who solves waits meanwhile. */
-typedef struct {
+struct uz_amg_trials {
     double *y, *b, *q;
     const uz_multigrid *mg;
     uz_multigrid_room *room;
     const uz_csc *K;
     double rounding; /* of uz_amg_info */
+    bool drawn;      /* b and y of the next pair */
     uint64_t state[PAIR];
     double reach[PAIR];  /* ||D^1/2 y|| */
     double missed[PAIR]; /* >= ||D^-1/2 q|| */
     double work[PAIR];   /* b'K^-1 b, but for q'K^-1 q */
-} trials;
+};
 
 /* b = D^1/2 s, y = 0. */
 static void draw(void *ctx, int trial)
 {
-    trials *x = ctx;
+    uz_amg_trials *x = ctx;
     const uz_csc *K = x->K;
     double *b = x->b + trial * K->cols;
     uint64_t state = x->state[trial]; /* the other thread's stands beside it */
@@ -112,9 +113,36 @@ static void draw(void *ctx, int trial)
     memset(x->y + trial * K->cols, 0, (size_t)K->cols * sizeof *x->y);
 }
 
+uz_amg_trials *uz_amg_draw(const uz_csc *K)
+{
+    const int64_t n = K->cols;
+    uz_amg_trials *x = uz_alloc_zero(1, sizeof *x);
+    if (!x)
+        return NULL;
+    *x = (uz_amg_trials){.y = uz_alloc(PAIR * n, sizeof *x->y),
+                         .b = uz_alloc(PAIR * n, sizeof *x->b),
+                         .q = uz_alloc(PAIR * n, sizeof *x->q),
+                         .K = K,
+                         .drawn = true,
+                         .state = {0xD1B54A32D192ED03u, 0x8CB92BA72F3D8DD6u}};
+    if (!x->y || !x->b || !x->q) {
+        uz_amg_trials_free(x);
+        return NULL;
+    }
+    uz_aside_share(draw, x, PAIR);
+    return x;
+}
+
+void uz_amg_trials_free(uz_amg_trials *x)
+{
+    if (x)
+        uz_free_all(x->y, x->b, x->q);
+    free(x);
+}
+
 static void measure(void *ctx, int trial)
 {
-    trials *x = ctx;
+    uz_amg_trials *x = ctx;
     const uz_csc *K = x->K;
     const double *y = x->y + trial * K->cols, *b = x->b + trial * K->cols, *q = x->q + trial * K->cols;
     double wide = 0.0, left = 0.0, size = 0.0, work = 0.0;
@@ -132,14 +160,16 @@ static void measure(void *ctx, int trial)
 }
 
 /* Two, of which the residuals are to be below `most`. */
-static uz_status try_both(uz_amg_info *amg, double *reach, double *missed, trials *x, double most,
+static uz_status try_both(uz_amg_info *amg, double *reach, double *missed, uz_amg_trials *x, double most,
                           const uz_hooks *hooks, uz_error *err)
 {
     uz_cg_stop stop = {
         .absolute = ASKED / LEFT * most, .max_iterations = STEPS_MOST, .hooks = hooks, .deadline = INFINITY};
     double before = INFINITY;
     bool negative = false;
-    uz_aside_share(draw, x, PAIR);
+    if (!x->drawn)
+        uz_aside_share(draw, x, PAIR);
+    x->drawn = false;
     for (int k = 0; k < TIGHTENED_MOST; k++) {
         uz_cg_info info = {0};
         const uz_status status = x->mg->kind->solve(x->mg, x->K, x->room, &info, x->y, x->q, x->b, PAIR, &stop, err);
@@ -176,23 +206,17 @@ static uz_status fail_probes(double missed, uz_error *err)
                    missed);
 }
 
-uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_hooks *hooks, uz_error *err)
+uz_status uz_amg_probe(uz_amg *amg, uz_amg_trials *x, double rounding, const uz_hooks *hooks, uz_error *err)
 {
     const double start = uz_seconds();
-    const int64_t n = K->cols;
     double reach = 0.0, missed = 0.0;
     size_t bytes;
-    trials x = {.y = uz_alloc(PAIR * n, sizeof *x.y),
-                .b = uz_alloc(PAIR * n, sizeof *x.b),
-                .q = uz_alloc(PAIR * n, sizeof *x.q),
-                .mg = amg->mg,
-                .room = amg->mg->kind->room(amg->mg, &bytes),
-                .K = K,
-                .rounding = rounding,
-                .state = {0xD1B54A32D192ED03u, 0x8CB92BA72F3D8DD6u}};
-    uz_status status = x.y && x.b && x.q && x.room
-                           ? UZ_OK
-                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)n);
+    uz_status status = UZ_OK;
+    x->mg = amg->mg;
+    x->room = amg->mg->kind->room(amg->mg, &bytes);
+    x->rounding = rounding;
+    if (!x->room)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)x->K->cols);
     amg->info.least = 0.0;
     amg->info.rounding = rounding;
     for (int k = PAIR; status == UZ_OK && k <= PROBES_MOST && !(amg->info.least > 0.0); k += PAIR) {
@@ -202,7 +226,7 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_h
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
             break;
         }
-        status = try_both(&amg->info, &wide, &left, &x, LEFT * t, hooks, err);
+        status = try_both(&amg->info, &wide, &left, x, LEFT * t, hooks, err);
         reach = fmax(reach, wide);
         missed = fmax(missed, left);
         if (status == UZ_OK && missed <= LEFT * t)
@@ -214,9 +238,8 @@ uz_status uz_amg_probe(uz_amg *amg, const uz_csc *K, double rounding, const uz_h
         amg->info.rcond = fmin(amg->info.rcond, 1.0 / reach);
         amg->mg->drift = FLT_EPSILON / sqrt(amg->info.rcond);
     }
-    if (x.room)
-        amg->mg->kind->free_room(x.room);
-    uz_free_all(x.y, x.b, x.q);
+    if (x->room)
+        amg->mg->kind->free_room(x->room);
     amg->info.spectrum_s += uz_seconds() - start;
     return status;
 }

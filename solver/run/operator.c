@@ -156,6 +156,7 @@ static uz_status spread(making *m, uz_error *err)
     const bool may = m->hooks && m->hooks->group;
     uz_process_group *group = may ? m->hooks->group(m->hooks->ctx, why, sizeof why) : NULL;
     uz_multigrid *mg = NULL;
+    uz_amg_trials *trials = NULL;
     double rounding = 0.0;
     if (!group)
         return uz_fail(err, UZ_ERR_UNSUPPORTED, "operator", "operator distributed: %s", why);
@@ -166,6 +167,8 @@ static uz_status spread(making *m, uz_error *err)
     uz_modes_clear(&modes);
     if (status == UZ_OK) {
         status = uz_amg_rounding(&rounding, m->K, err); /* while the group is at work */
+        if (status == UZ_OK && !(trials = uz_amg_draw(m->K)))
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to check solves of %lld dofs", (long long)m->K->cols);
         const uz_status awaited = uz_group_await(mg, status == UZ_OK ? err : NULL);
         status = status == UZ_OK ? awaited : status;
         if (status != UZ_OK)
@@ -177,8 +180,9 @@ static uz_status spread(making *m, uz_error *err)
                                     : uz_amg_of(&m->setup->amg, mg, m->K, 0, m->hooks, err);
     if (status == UZ_OK) {
         m->setup->amg->info.create_s = made - start;
-        status = uz_amg_probe(m->setup->amg, m->K, rounding, m->hooks, err);
+        status = uz_amg_probe(m->setup->amg, trials, rounding, m->hooks, err);
     }
+    uz_amg_trials_free(trials);
     return status;
 }
 

@@ -210,7 +210,9 @@ static void far_begin(far_body *b, double weak)
     CHECK(uz_amg_rounding(&rounding, &b->qp.K, &err) == UZ_OK && rounding > 0.0);
     CHECK(uz_group_await(mg, &err) == UZ_OK);
     CHECK(uz_amg_of_definite(&b->amg, mg, &err) == UZ_OK);
-    CHECK_MSG(uz_amg_probe(b->amg, &b->qp.K, rounding, NULL, &err) == UZ_OK, "%s", err.message);
+    uz_amg_trials *trials = uz_amg_draw(&b->qp.K);
+    CHECK_MSG(uz_amg_probe(b->amg, trials, rounding, NULL, &err) == UZ_OK, "%s", err.message);
+    uz_amg_trials_free(trials);
     const uz_dual_source source = {.op = UZ_OPERATOR_DISTRIBUTED, .N = &b->no_rows, .amg = b->amg};
     CHECK(uz_dual_create(&b->dual, &source, NULL, &err) == UZ_OK);
     CHECK(uz_dual_load_create(&b->load, b->dual, &b->qp.K, b->qp.p, &b->none, &err) == UZ_OK);
