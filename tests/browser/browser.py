@@ -3,6 +3,11 @@
 A test is a function test_*(s, b): s is a running Service (tests/api/service.py), b the browser, a selenium WebDriver with
 a few methods more. `browser.main(globals())` runs them like service.main. WebGL is drawn by SwiftShader, without a
 graphics card. After each test its console must be empty: whatever a test provokes on purpose it takes by b.console().
+
+BROWSER_SLOW=6 makes the page as slow as a far service and an old phone do, in every tab: each request is answered 300 ms
+late, what a script fetches up to 700 ms more, at random, so that answers overtake each other, and the processor takes six
+times as long (1: as ever, for a machine that is busy anyway). A test that reads once what it should wait for fails then,
+and so does one of a page that takes a stale answer for a new one.
 """
 import base64
 import os
@@ -42,6 +47,26 @@ def start(width=1200, height=900, dark=False):
     return Browser(driver, width, height, dark)
 
 
+SLOW = float(os.environ.get("BROWSER_SLOW") or 0)  # times that the processor takes as long; 0: nothing is late
+LATE = """const fetched = window.fetch;
+window.fetch = async (...asked) => {
+    const answer = await fetched(...asked);
+    await new Promise((done) => setTimeout(done, 700 * Math.random()));
+    return answer;
+};"""
+HOLD = """const fetched = window.fetch, part = arguments[0];
+window.held = [];
+window.end_hold = () => (window.fetch = fetched);
+window.fetch = async (...asked) => {
+    const answer = await fetched(...asked);
+    if (asked[0].includes(part)) await new Promise((done) => window.held.push(done));
+    return answer;
+};"""
+RELEASE = """const [which, done] = arguments;
+if (which === null) window.end_hold();
+for (const i of which ?? window.held.keys()) window.held[i]();
+setTimeout(done, 100);"""
+
 # What an element shows; of one that is hidden innerText would be all that is in it.
 SHOWN = "const e = document.querySelector(arguments[0]); const text = e?.checkVisibility() ? e.innerText : ''; "
 
@@ -51,6 +76,7 @@ class Browser:
 
     def __init__(self, driver, width, height, dark):
         self.driver = driver
+        self.slowed = set()
         self.size(width, height)
         self.media("prefers-color-scheme", "dark" if dark else "light")
 
@@ -66,8 +92,19 @@ class Browser:
         """One command of Chromium's own protocol."""
         return self.driver.execute_cdp_cmd(name, arguments)
 
+    def slow_down(self):
+        """Makes the tab as slow as BROWSER_SLOW asks for, once."""
+        tab = self.driver.current_window_handle
+        if SLOW and tab not in self.slowed:
+            self.slowed.add(tab)
+            self.command("Network.enable")
+            self.command("Network.emulateNetworkConditions", offline=False, latency=300, downloadThroughput=-1, uploadThroughput=-1)
+            self.command("Emulation.setCPUThrottlingRate", rate=SLOW)
+            self.command("Page.addScriptToEvaluateOnNewDocument", source=LATE)
+
     def open(self, s, place=""):
         """Loads the page of a service anew, at a view: "", "new", "jobs/ID", "compare"."""
+        self.slow_down()
         self.driver.get("about:blank")
         self.driver.get(f"{s.url}/#/{place}")
         self.wait("the view", "return document.querySelector('main').childElementCount > 0")
@@ -136,6 +173,19 @@ class Browser:
     def console(self):
         """What came to the console since the last call: [level, message]."""
         return [(line["level"], line["message"]) for line in self.driver.get_log("browser") if line["level"] != "DEBUG"]
+
+    def hold(self, part):
+        """Answers that the page fetches from an address with `part` in it come to it when they are released."""
+        self.run(HOLD, part)
+
+    def held(self, count=1):
+        """Waits until so many answers are there."""
+        self.wait(f"{count} answers", "return window.held.length >= arguments[0]", count)
+
+    def release(self, *which):
+        """Answers, numbered as they came, go to the page, which has taken them then; without a number all, and none is
+        held any more."""
+        self.driver.execute_async_script(RELEASE, which or None)
 
     def picture(self, selector=None):
         """The PNG bytes of the page as it is in sight, or of an element."""
