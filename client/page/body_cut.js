@@ -54,10 +54,10 @@ export class Cut {
   }
 
   async fetch() {
-    const { plane, surface } = this;
+    const { plane, surface, stress } = this;
     if (!plane) return;
     const point = [0, 1, 2].map((c) => (c === this.axis ? surface.origin[c] + surface.unit * this.offset : surface.origin[c]));
-    const query = new URLSearchParams({ point: point.join(","), normal: plane[0].join(","), fields: this.stress ? "displacements,von_mises" : "displacements" });
+    const query = new URLSearchParams({ point: point.join(","), normal: plane[0].join(","), fields: stress ? "displacements,von_mises" : "displacements" });
     if (this.case_name) query.set("case", this.case_name);
     let error = null, section = null;
     try {
@@ -66,6 +66,7 @@ export class Cut {
       error = refused;
     }
     if (this.ends.signal.aborted || String(this.plane) !== String(plane)) return; // moved meanwhile
+    if (this.stress && !stress) return void this.fetch(); // wanted meanwhile
     this.section = section;
     this.on_change(error);
   }

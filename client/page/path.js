@@ -36,7 +36,7 @@ function columns_of(got, units) {
  */
 export function mountPath(element, api, job, { case: case_name, units, surface, on_line, pick }) {
   const ends = new AbortController(), line = first_line(surface);
-  let got = null;
+  let got = null, asking = null;
   const typed = ["From", "To"].map((name, k) => h("input", { id: `path-${name.toLowerCase()}`, class: "path-end", value: written(line[k]), autocomplete: "off", onchange: () => load() }));
   const trouble = h("p", { class: "bad", role: "alert", hidden: true });
   const picker = h("button", { type: "button", class: "small", id: "path-pick", "aria-pressed": "false", onclick: () => pick_end(picker.getAttribute("aria-pressed") === "true" ? 2 : 0) }, "Click both in the picture");
@@ -45,7 +45,7 @@ export function mountPath(element, api, job, { case: case_name, units, surface, 
   const curve = new Curve("path-curve", (column) => ({ x: { label: `distance from (${typed[0].value})${unit_of({ problem: { units } }, "length").replace(" ", ", ")}` },
     series: [{ name: column.name, colour: 1, gaps: true, points: got.distance.map((x, i) => [x, column.values[i] ?? NaN]) }],
     label: `${column.name} along the line from (${typed[0].value}) to (${typed[1].value})` }));
-  const details = h("details", { class: "path", ontoggle: () => (details.open ? load() : (pick_end(2), on_line(null))) }, h("summary", null, "Along a line through the body"),
+  const details = h("details", { class: "path", ontoggle: () => (details.open ? load() : (asking?.abort(), pick_end(2), on_line(null))) }, h("summary", null, "Along a line through the body"),
     h("div", { class: "body-tools" }, typed.map((field, k) => h("label", null, ["From", "to"][k], field)), picker, curve.choice, file), trouble, curve.place);
   show(element, details);
 
@@ -72,20 +72,25 @@ export function mountPath(element, api, job, { case: case_name, units, surface, 
     show(trouble, error.message);
   }
 
+  /** Of a line that was changed meanwhile nothing is wanted any more. */
   async function load() {
+    asking?.abort();
+    const { signal } = (asking = new AbortController());
     try {
-      got = await api.get(address("path"), { signal: ends.signal });
+      got = await api.get(address("path"), { signal });
+      if (signal.aborted) return;
       trouble.hidden = true;
       curve.take(columns_of(got, units), "von_mises");
       on_line(got.points.map((at, i) => ({ at, u: got.displacements[i] })).filter(({ u }) => u[0] !== null));
     } catch (error) {
-      complain(error);
+      if (!signal.aborted) complain(error);
     }
   }
 
   return {
     destroy: () => {
       ends.abort();
+      asking?.abort();
       curve.destroy();
     },
   };
