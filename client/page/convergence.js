@@ -26,8 +26,10 @@ class History {
     if (this.case_name) query.set("case", this.case_name);
     const got = await this.api.get(`/v1/jobs/${this.id}/history?${query}`, { signal });
     got.columns.forEach((name, i) => (this.at[name] = i));
-    for (const row of got.rows) this.rows.push(row);
-    return got.rows.length > 0;
+    const last = this.rows[this.rows.length - 1]?.[0] ?? -1; // a second answer to the same question may have come meanwhile
+    const fresh = got.rows.filter((row) => row[0] > last);
+    this.rows.push(...fresh);
+    return fresh.length > 0;
   }
 
   points(quantity, x) {

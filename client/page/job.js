@@ -58,7 +58,7 @@ class JobView {
       if (now && has_ended(now)) return this.take(now); // it ended meanwhile: nobody asked to delete it
       const left = await this.api.remove(`/v1/jobs/${this.id}`);
       if (left) this.take(left);
-      else location.hash = "#/";
+      else if (!this.ends.signal.aborted) location.hash = "#/";
       return undefined;
     };
     const stop = ended ? menu_button("More about this job", () => [{ label: "Delete", sure: "Delete for good", act: end }], (error) => this.complain(error))
@@ -115,8 +115,9 @@ class JobView {
     show(this.progress, h("progress", { value: job.progress, max: 100, "aria-label": "Progress" }), h("span", { id: "progress-text" }, words.join(", ")));
   }
 
-  /** A status came. */
+  /** A status came. What has ended does not run again: an answer that says so was overtaken. */
   take(job) {
+    if (this.job && has_ended(this.job) && !has_ended(job)) return;
     const first = !this.job, changed = first || this.job.status !== job.status;
     this.job = job;
     if (changed) {
@@ -242,7 +243,8 @@ class JobView {
         const { mountBody } = await import("./body.js");
         const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name, path: is_path(this.cases),
           units: this.summary().problem.units });
-        this.parts.push(() => body.destroy());
+        if (place.isConnected) this.parts.push(() => body.destroy());
+        else body.destroy(); // another load case or view meanwhile
       } catch (error) {
         open.disabled = false;
         this.complain(error);

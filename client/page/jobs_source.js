@@ -43,9 +43,11 @@ export class JobsSource {
     return (!this.filter.status || job.status === this.filter.status) && this.filter.tags.every((tag) => job.tags.includes(tag));
   }
 
-  /** Takes a job as it is now; returns whether it is a new one at the top. */
+  /** Takes a job as it is now; returns whether it is a new one at the top. What has ended does not run again: an answer
+   * that says so was overtaken. */
   put(job) {
     const known = this.by_id.get(job.id);
+    if (known?.ended && !has_ended(job)) return false;
     if (!this.matches(job)) {
       this.drop(job.id);
       return false;

@@ -14,6 +14,21 @@ CURVES = """return [...document.querySelectorAll('#convergence path.line')].map(
     [path.dataset.series, path.getAttribute('d').split(/[ML]/).length - 1])"""
 
 
+# Whether no curve goes back.
+FORWARD = """return [...document.querySelectorAll('#convergence path.line')].every((path) =>
+    [...path.getAttribute('d').matchAll(/[ML](-?[\\d.]+)/g)].every(([, x], i, all) => i === 0 || +x >= +all[i - 1][1]))"""
+# What the service says to DELETE while the job still runs, and what comes after the end that it led to.
+RUNS_STILL = """const fetched = window.fetch;
+window.fetch = async (...asked) => {
+    const answer = await fetched(...asked);
+    if (asked[1]?.method !== 'DELETE') return answer;
+    const said = JSON.stringify({...await answer.json(), status: 'running', summary: null});
+    await new Promise((done) => setTimeout(done, 300));
+    setTimeout(() => (window.said = true), 50);
+    return new Response(said, {headers: {'Content-Type': 'application/json'}});
+};"""
+
+
 def plain(text):
     """A number as the page writes it."""
     return float(text.replace("×10", "e").replace(",", "").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
@@ -42,6 +57,11 @@ def test_is_watched_live_from_the_editor_on(s, b):
     rows = "return document.querySelector('#convergence p[role=status]').innerText"
     said = b.run(rows)
     b.wait("more iterations", rows.replace("return ", "return arguments[0] !== "), said)
+    # Two answers to the same question, as a slow one is asked again meanwhile: each iteration is drawn once.
+    b.hold("/history?")
+    b.held(2)
+    b.release()
+    check(b.run(FORWARD), b.run(CURVES))
     check({one[0] for one in first} >= {"certified bound", "total residual"}, first)
     # What is asked for is a line, the bound is told relative to the answer, and how long that may take.
     b.wait("the line", "return [...document.querySelectorAll('#convergence path.line')].some((path) => path.dataset.series.startsWith('asked for'))")
@@ -55,8 +75,11 @@ def test_is_watched_live_from_the_editor_on(s, b):
     check("time left unknown" in words or "time left about" in words, words)
     b.click("#stop")
     b.says("#stop", "Cancel?")
+    b.run(RUNS_STILL)
     b.click("#stop")
     b.says(".verdict h2", "Dismissed")
+    b.wait("the late answer", "return window.said")
+    b.says(".title", "dismissed")
     b.says("#certificate", "differs by at most")
     check(s.get("/v1/jobs?tag=watched").json["jobs"][0]["summary"]["outcome"] == "dismissed", "the daemon says otherwise")
     check(not b.run("return document.querySelector('section.progress').checkVisibility()"), "there is progress no longer")
