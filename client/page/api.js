@@ -14,7 +14,7 @@ export class ApiError extends Error {
 }
 
 /** As window.fetch. Of a lost connection browsers say little, and each something else. */
-async function ask_service(path, init) {
+export async function ask_service(path, init) {
   try {
     return await fetch(path, init);
   } catch (error) {

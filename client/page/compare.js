@@ -143,17 +143,27 @@ function chooser(on_start) {
   const options = [...EXAMPLES.map((one) => [one.name, one.text]), ...(draft.get() ? [["draft", "What stands in the editor"]] : [])];
   const select = h("select", { id: "compare-what" }, options.map(([value, text]) => h("option", { value }, text)));
   const trouble = h("p", { class: "bad", role: "alert", hidden: true });
+  const complain = (text) => {
+    trouble.hidden = false;
+    show(trouble, text);
+  };
   const start = async (event) => {
     event.preventDefault();
-    const text = select.value === "draft" ? draft.get() : await example_text(select.value);
-    const { mistake } = locate(text);
-    if (mistake) {
-      trouble.hidden = false;
-      show(trouble, `What stands in the editor is not JSON: ${mistake.message}.`);
-    } else on_start(JSON.parse(text));
+    button.disabled = true; // a second press would make four more jobs
+    try {
+      const text = select.value === "draft" ? draft.get() : await example_text(select.value);
+      const { mistake } = locate(text);
+      if (mistake) complain(`What stands in the editor is not JSON: ${mistake.message}.`);
+      else if (form.isConnected) on_start(JSON.parse(text));
+    } catch (error) {
+      complain(error.message);
+    }
+    button.disabled = false;
   };
-  return h("form", { class: "editor-tools", onsubmit: start }, h("label", { for: "compare-what" }, "Body"), select,
-    h("button", { type: "submit", class: "primary", id: "compare-start" }, "Solve at all four accuracies"), trouble);
+  const button = h("button", { type: "submit", class: "primary", id: "compare-start" }, "Solve at all four accuracies");
+  const form = h("form", { class: "editor-tools", onsubmit: start }, h("label", { for: "compare-what" }, "Body"), select,
+    button, trouble);
+  return form;
 }
 
 export function show_compare(main, { api }, tag) {

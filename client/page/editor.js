@@ -46,16 +46,19 @@ class Editor {
     show(main, form);
   }
 
+  /** An example comes late where the service is far: not over what was typed meanwhile, nor over another view's text. */
   async start(name) {
+    const { key } = this, wanted = () => this.key === key && !this.ends.signal.aborted;
     try {
       if (EXAMPLES.some((one) => one.name === name)) this.examples.value = name;
       else this.examples.value = "";
       if (this.examples.value || !draft.get()) {
         this.examples.value = this.examples.value || EXAMPLES[0].name;
-        this.set(await example_text(this.examples.value));
+        const text = await example_text(this.examples.value);
+        if (wanted()) this.set(text);
       } else this.set(draft.get());
     } catch (error) {
-      this.say("bad", error.message);
+      if (wanted()) this.say("bad", error.message);
     }
   }
 
@@ -169,7 +172,7 @@ class Editor {
   }
 
   async send() {
-    const { text } = this.field, found = locate(text);
+    const { key } = this, { text } = this.field, found = locate(text);
     this.check_soon.cancel();
     this.checking?.abort();
     if (found.mistake) {
@@ -178,10 +181,10 @@ class Editor {
     }
     this.submit.disabled = true;
     try {
-      const job = await this.api.post("/v1/jobs", text, { headers: { "Idempotency-Key": this.key } });
+      const job = await this.api.post("/v1/jobs", text, { headers: { "Idempotency-Key": key } });
       if (!this.ends.signal.aborted) location.hash = `#/jobs/${job.id}`;
     } catch (error) {
-      this.refused(error, true);
+      if (this.key === key && !this.ends.signal.aborted) this.refused(error, true); // else of another text
     }
     this.submit.disabled = false;
   }

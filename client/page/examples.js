@@ -1,5 +1,6 @@
 // examples.js: bodies to start from. The bundler makes a file of each, fetched when it is chosen.
 
+import { ask_service } from "./api.js";
 import { pretty } from "./json_locate.js";
 import paper from "../../tests/data/paper_body.json";
 import bracket from "../examples/gallery/bracket.json";
@@ -18,7 +19,7 @@ export const EXAMPLES = [
 /** The JSON text of an example. */
 export async function example_text(name) {
   const example = EXAMPLES.find((one) => one.name === name);
-  const response = await fetch(example.file, { credentials: "omit" });
+  const response = await ask_service(example.file, { credentials: "omit" });
   if (!response.ok) throw new Error(`the example could not be loaded: status ${response.status}`);
   const text = await response.text();
   return text.trim().includes("\n") ? text.trimEnd() : pretty(JSON.parse(text));

@@ -41,6 +41,7 @@ async function go() {
   const view = VIEWS.find((one) => one.pattern.test(at));
   end_view?.();
   end_view = null;
+  main.replaceChildren(); // nothing of a view that has ended can be pressed while the next is loaded
   mark_home(view, at);
   document.title = `${view ? view.title : "Nothing here"} · Contact solver`;
   if (!view) {
@@ -54,7 +55,6 @@ async function go() {
       h("button", { type: "button", onclick: () => location.reload() }, "Try again"));
     return;
   }
-  main.replaceChildren();
   end_view = run(main, { api, token }, view.pattern.exec(at)[1]);
 }
 

@@ -15,7 +15,7 @@ export function refine_form(api, job) {
     const accuracy = Number.isFinite(Number(level.value)) ? { relative_error: Number(level.value) } : level.value;
     try {
       const made = await api.post(`/v1/jobs/${job.id}/refine`, JSON.stringify({ accuracy }), { headers: { "Idempotency-Key": key + level.value } });
-      location.hash = `#/jobs/${made.id}`;
+      if (form.isConnected) location.hash = `#/jobs/${made.id}`;
     } catch (error) {
       trouble.hidden = false;
       show(trouble, error.message);

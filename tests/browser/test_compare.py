@@ -1,13 +1,20 @@
 """The comparison of the four accuracies. usage: test_compare.py BUILD_DIR [FILTER]"""
 import browser
 from browser import check
+from service import wait_until
 
 LEVELS = ["quick", "balanced", "precise", "exact"]
 
 
 def test_four_accuracies_side_by_side(s, b):
     b.open(s, "compare")
-    b.click("#compare-start")
+    b.hold(".json")
+    b.one("#compare-start")
+    b.run("const start = document.querySelector('#compare-start'); start.click(); start.click()")
+    b.held()
+    b.release(0)
+    wait_until(lambda: s.get("/v1/jobs").json["jobs"])
+    b.release()  # what a second press asked for, if it did
     b.says("main", "All four are solved")
     tag = b.driver.current_url.split("/")[-1]
     jobs = {next(t[6:] for t in job["tags"] if t.startswith("level-")): job for job in s.get(f"/v1/jobs?tag={tag}").json["jobs"]}

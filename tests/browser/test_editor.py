@@ -93,6 +93,31 @@ def test_examples_are_all_valid(s, b):
         b.says("#verdict", "Valid")
 
 
+def test_an_example_that_comes_late_replaces_nothing(s, b):
+    """Neither what was typed meanwhile nor the draft, where another example was chosen."""
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    value = "return document.querySelector('#job-text').value"
+    b.hold("gear")
+    b.run("location.hash = '#/new/gear'")
+    b.held()
+    b.write("#job-text", TEXT)
+    b.release(0)
+    check(b.run(value) == TEXT, b.run(value)[:300])
+    b.run("location.hash = '#/new/'")
+    b.run("location.hash = '#/new/gear'")
+    b.held(2)
+    b.run("location.hash = '#/new/cylinder'")
+    b.wait("the other example", "return document.querySelector('#example')?.value === 'cylinder'")
+    chosen = b.wait("its text", value)
+    b.release()
+    b.run("location.hash = '#/'")
+    b.says("h1", "Jobs")
+    b.run("location.hash = '#/new'")
+    b.says("#verdict", "Valid")
+    check(b.run(value) == chosen, b.run(value)[:300])
+
+
 def test_the_schema_explains_the_key_at_the_caret(s, b):
     b.open(s, "new")
     b.says("#verdict", "Valid")
