@@ -8,7 +8,7 @@ import xml.etree.ElementTree
 
 import browser
 from browser import check, options
-from service import ENDLESS, MATRICES, SCENE
+from service import ENDLESS, MATRICES, PATIENT_S, SCENE
 
 CURVES = """return [...document.querySelectorAll('#convergence path.line')].map((path) =>
     [path.dataset.series, path.getAttribute('d').split(/[ML]/).length - 1])"""
@@ -34,7 +34,7 @@ def plain(text):
     return float(text.replace("×10", "e").replace(",", "").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
 
 
-def file_saved(b, name, seconds=20):
+def file_saved(b, name, seconds=PATIENT_S):
     """The bytes of a file that the page saved; a browser first puts an empty one in its place."""
     path = pathlib.Path(b.downloads, name)
     end = time.monotonic() + seconds
@@ -99,6 +99,7 @@ def test_whole_error_is_drawn(s, b):
         check(b.near(f"{chart} .chart", "--series-1") > 60, width, "the curve has too few pixels")
         check(b.near(f"{chart} .chart", "--series-2") > 50, width, "what was asked for is not seen")
         # Numbers at the axis stand between its name and the axis.
+        b.wait("each chart", "return [...document.querySelectorAll('.chart')].every((one) => !one.checkVisibility() || one.querySelector('.label[transform]'))")
         boxes = b.run("""const box = (e) => { const r = e.getBoundingClientRect(); return [r.left, r.right]; };
             const all = [...document.querySelectorAll('.chart')].filter((one) => one.checkVisibility());
             return all.map((one) => [box(one.querySelector('.label[transform]')), ...[...one.querySelectorAll('.tick[text-anchor=end]')].map(box)])""")
@@ -210,6 +211,7 @@ def check_few_iterations_and_near_names(s, b, cells):
     levels = {one["level"]: one["relative_error"] for one in s.get(f"/v1/jobs/{job['id']}/work-precision").json["levels"]}
     downwards = [name for name, _, _, _, _ in sorted(names, key=lambda one: one[2])]
     check(downwards == sorted(levels, key=levels.get, reverse=True), "names stand in the order of their errors", downwards, levels)
+    b.wait("the convergence", "return document.querySelector('#convergence path.line')")
     ticks = b.run("return [...document.querySelectorAll('#convergence .tick[text-anchor=middle]')].map((t) => t.textContent)")
     check(len(ticks) >= 2 and all(text.isdigit() for text in ticks), "an iteration is a whole number", ticks)
     mesh = b.run("return document.querySelector('#precision path.line.series-2')?.getBoundingClientRect().width")
