@@ -216,6 +216,12 @@ class Browser:
         return sum(n for got, n in self.pixels(selector).items()
                    if sum((a - b) ** 2 for a, b in zip(got, wanted)) <= distance ** 2)
 
+    def shows(self, selector, colour, more_than, distance=40):
+        """Waits until more pixels than so many are near the colour."""
+        end = time.monotonic() + PATIENT_S
+        while (found := self.near(selector, colour, distance)) <= more_than:
+            check(time.monotonic() < end, selector, "has", found, "pixels like", colour, "of more than", more_than)
+
     def quit(self):
         self.driver.quit()
 

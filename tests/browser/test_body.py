@@ -163,7 +163,7 @@ def test_nodes_parts_and_the_contact_along_the_surface(s, b):
     switch(b, "Elements")
     check(brightness(b) > lined + 0.5, "elements are still drawn:", lined, brightness(b))
     b.one(".body-pressure .chart")
-    check(b.near(".body-pressure .chart", "--series-1", 60) > 100, "the line")
+    b.shows(".body-pressure .chart", "--series-1", 100, 60)
     b.click(".pressure-table summary")
     b.one(".pressure-table table")
     rows = b.run("return [...document.querySelectorAll('.pressure-table tbody tr')].map((tr) => [...tr.children].map((td) => td.innerText))")
@@ -175,7 +175,7 @@ def test_a_solid_is_turned_enlarged_and_moved(s, b):
     show_all(s, b, SOLID)
     first = b.pixels(".body-frame")
     check(sum(coloured(b)) > 5000, coloured(b))
-    check(b.near(".body-frame", "#c8c8c8", 45) > 5000, "the sphere")
+    b.shows(".body-frame", "#c8c8c8", 5000, 45)
     for act in (lambda: press(b, "ArrowLeft"), lambda: press(b, "ArrowUp"), lambda: press(b, "+"), lambda: press(b, "ArrowLeft", True)):
         after(b, act)
         now = b.pixels(".body-frame")
@@ -261,7 +261,7 @@ def test_it_begins_where_it_touches(s, b):
     press_button(b, "Top")
     check(below > 100 and b.near(".body-frame", "--push", 60) == 0, "arrows from below and above", below)
     press_button(b, "Front")
-    check(b.near(".body-frame", "--push", 60) > 50, "arrows from the front")
+    b.shows(".body-frame", "--push", 50, 60)
 
 
 def test_colours_between_other_values(s, b):
@@ -353,7 +353,7 @@ def test_fields_along_a_line(s, b):
         b.media("prefers-color-scheme", "dark" if dark else "light")
         b.wait("drawn anew", "return document.querySelector('.path .chart').getBoundingClientRect().right <= innerWidth")
         check(b.run("return document.documentElement.scrollWidth <= innerWidth"), width, "the page is wider than the screen")
-        check(b.near(".path .chart", "--series-1") > 60, width, "the curve has too few pixels")
+        b.shows(".path .chart", "--series-1", 60)
 
 
 def test_a_plane_cuts_a_solid(s, b):

@@ -38,7 +38,7 @@ def test_four_accuracies_side_by_side(s, b):
     for (a, ax, ay), (c, cx, cy) in zip(at, at[1:]):
         check((errors(a) > errors(c)) == (ay < cy), a, c, "errors", at)
         check(times(a) == times(c) or (times(a) < times(c)) == (ax < cx), a, c, "times", at)
-    check(b.near("#trade .chart", "--series-1") > 200, "the points are not seen")
+    b.shows("#trade .chart", "--series-1", 200)
     # By its address the comparison is there again, and makes no further jobs.
     b.open(s, f"compare/{tag}")
     b.says("main", "All four are solved")

@@ -218,7 +218,7 @@ def test_the_scene_is_drawn_while_it_is_typed(s, b):
     b.says("#verdict", "Valid")
     b.says("#preview", "1 support, 2 loads, 1 contact")
     check(all(pixels_of(b, kind) > 40 for kind in ("support", "load", "contact")), [pixels_of(b, kind) for kind in ("support", "load", "contact")])
-    check(b.near("#preview .body-frame", "#8a8f96", 12) > 5000, "the body")
+    b.shows("#preview .body-frame", "#8a8f96", 5000, 12)
     request = json.loads(b.run("return document.querySelector('#job-text').value"))
     request["problem"]["loads"] = []
     b.write("#job-text", json.dumps(request))

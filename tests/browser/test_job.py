@@ -96,8 +96,8 @@ def test_whole_error_is_drawn(s, b):
         b.media("prefers-color-scheme", "dark" if dark else "light")
         b.open(s, f"jobs/{s.get('/v1/jobs').json['jobs'][0]['id']}")
         b.says(chart, "Whole error and its price")
-        check(b.near(f"{chart} .chart", "--series-1") > 60, width, "the curve has too few pixels")
-        check(b.near(f"{chart} .chart", "--series-2") > 50, width, "what was asked for is not seen")
+        b.shows(f"{chart} .chart", "--series-1", 60)
+        b.shows(f"{chart} .chart", "--series-2", 50)
         # Numbers at the axis stand between its name and the axis.
         b.wait("each chart", "return [...document.querySelectorAll('.chart')].every((one) => !one.checkVisibility() || one.querySelector('.label[transform]'))")
         boxes = b.run("""const box = (e) => { const r = e.getBoundingClientRect(); return [r.left, r.right]; };
@@ -175,7 +175,7 @@ def test_convergence_is_drawn(s, b):
     b.open(s, f"jobs/{job['id']}")
     b.wait("three curves", "return document.querySelectorAll('#convergence path.line').length === 3")
     for number in (1, 2, 3):
-        check(b.near("#convergence .chart", f"--series-{number}") > 150, "curve", number, "has too few pixels")
+        b.shows("#convergence .chart", f"--series-{number}", 150)
     b.click("#convergence input[value=residual_total]")
     b.wait("two curves", "return document.querySelectorAll('#convergence path.line').length === 2")
     check(b.near("#convergence .chart", "--series-2") < 30, "a curve that was switched off is still seen")
@@ -234,7 +234,7 @@ def test_other_jobs_are_laid_over(s, b):
     b.write("#overlay", other["id"])
     b.click("#overlay-add")
     b.wait("six curves", "return document.querySelectorAll('#convergence path.line').length === 6")
-    check(b.near("#convergence .chart", "--series-2") > 100, "the other job's colour is not there")
+    b.shows("#convergence .chart", "--series-2", 100)
     check(other["id"][-8:] in b.text("#convergence .legend") and "accelerated" in b.text("#convergence .legend"), b.text("#convergence .legend"))
     b.click(".overlays button")
     b.wait("three curves again", "return document.querySelectorAll('#convergence path.line').length === 3")
