@@ -1,5 +1,6 @@
 """The scenes of the gallery against theory, and `make gallery`. usage: test_gallery.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import functools
 import json
 import pathlib
 import subprocess
@@ -12,9 +13,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "figures
 import gallery  # noqa: E402  the path is set above
 import inline  # noqa: E402
 import service  # noqa: E402
-from service import ROOT, check, expect, options  # noqa: E402
-
-SHARED = True  # one service for all tests
+from service import ROOT, check, options  # noqa: E402
 
 FOLDER = ROOT / "client/examples/gallery"
 FILES = {**{name: FOLDER / f"{name}.json" for name in ("cylinder", "press_fit", "gear", "bracket")},
@@ -22,10 +21,26 @@ FILES = {**{name: FOLDER / f"{name}.json" for name in ("cylinder", "press_fit", 
 SMALL = 150000  # bytes of a picture that is kept in the repository
 
 
+@functools.cache
+def made(build):
+    """The folder of what the command behind `make gallery` makes: each scene is solved once for all tests."""
+    folder = tempfile.TemporaryDirectory(prefix="gallery-")
+    done = subprocess.run(["tests/gallery.sh", build, folder.name], cwd=ROOT, capture_output=True, text=True, timeout=1000)
+    check(done.returncode == 0, done.stdout, done.stderr)
+    return folder
+
+
+def file_of(s, name, kind):
+    return pathlib.Path(made(s.build).name, f"{name}.{kind}")
+
+
+def summary_of(s, name):
+    return json.loads(file_of(s, name, "json").read_text())["summary"]
+
+
 def solved(s, name):
     """The scene's summary, which meets what was asked for."""
-    job = s.solve(json.loads(FILES[name].read_text()))
-    summary = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=summary"), 200).json["summary"]
+    summary = summary_of(s, name)
     check(summary["outcome"] == "converged", name, summary)
     check(summary["certificate"]["relative_error"] <= summary["requested_error"], name, summary["certificate"])
     check(summary["resultants"]["imbalance"] < 1e-6, name, summary["resultants"])
@@ -36,6 +51,7 @@ def near(got, wanted, tolerance):
     check(abs(got - wanted) <= tolerance * abs(wanted), got, "is not", wanted, "within", tolerance)
 
 
+@options(None)
 def test_cylinder_is_a_line_contact_of_hertz(s):
     contact = solved(s, "cylinder")["contact"]
     pressure, half_width = gallery.hertz(contact)
@@ -44,6 +60,7 @@ def test_cylinder_is_a_line_contact_of_hertz(s):
     check(contact["max_pressure_at"]["x"] == [0, -50], contact)
 
 
+@options(None)
 def test_press_fit_has_the_pressure_of_lame(s):
     """The nodes of the rings do not meet, and chords of different lengths are on top of each other, so that single
     pressures scatter about the mean."""
@@ -53,6 +70,7 @@ def test_press_fit_has_the_pressure_of_lame(s):
     near(contact["force"][0], contact["force"][1], 1e-6)  # the same along both axes of a quarter
 
 
+@options(None)
 def test_bracket_is_held_by_bolt_and_wall(s):
     """Contact alone holds it: the bolt carries the load, bolt and wall the couple that it makes."""
     acts = solved(s, "bracket")["resultants"]
@@ -64,6 +82,7 @@ def test_bracket_is_held_by_bolt_and_wall(s):
     check(wall["force"][0] > 0, wall)
 
 
+@options(None)
 def test_gear_presses_each_tooth(s):
     """Symmetric about the middle of the block, so that the moment is the force by half its width. The corners of the
     teeth strain the rubber by more than small deformation allows, which has to be said."""
@@ -74,6 +93,7 @@ def test_gear_presses_each_tooth(s):
     check("large_strain" in [one["code"] for one in summary["warnings"]], summary["warnings"])
 
 
+@options(None)
 def test_paper_body(s):
     contact = solved(s, "paper_body")["contact"]
     check(contact["active"] == 22, contact)
@@ -98,18 +118,15 @@ def check_picture(path):
 
 @options(None)
 def test_make_gallery(s):
-    """The command behind `make gallery`, and that what it draws is what is kept, and its numbers are those of the tutorial."""
+    """What it draws is what is kept, and its numbers are those of the tutorial."""
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(["tests/gallery.sh", s.build, folder], cwd=ROOT, capture_output=True, text=True, timeout=300)
-        check(done.returncode == 0, done.stdout, done.stderr)
-        for name in FILES:
-            text = (pathlib.Path(folder) / f"{name}.txt").read_text()
-            rows.append(gallery.scene(name, json.loads((pathlib.Path(folder) / f"{name}.json").read_text())["summary"]))
-            check(rows[-1]["outcome"] == "converged" and rows[-1]["active"] <= rows[-1]["candidates"], rows[-1])
-            check("outcome     converged" in text and "\nforces " in text, text)
-            drawn = check_picture(pathlib.Path(folder) / f"{name}.svg")
-            check(drawn == check_picture(FOLDER / f"{name}.svg"), name, drawn)
+    for name in FILES:
+        text = file_of(s, name, "txt").read_text()
+        rows.append(gallery.scene(name, summary_of(s, name)))
+        check(rows[-1]["outcome"] == "converged" and rows[-1]["active"] <= rows[-1]["candidates"], rows[-1])
+        check("outcome     converged" in text and "\nforces " in text, text)
+        drawn = check_picture(file_of(s, name, "svg"))
+        check(drawn == check_picture(FOLDER / f"{name}.svg"), name, drawn)
     kept = json.loads((ROOT / "docs/figures/gallery.json").read_text())
     for name, value in inline.VALUES.items():
         if name.split(".")[0] in FILES:
