@@ -60,6 +60,9 @@ long_functions() { # names every function of more than 80 lines: its braces stan
          /^\}$/ && start {if (FNR - start - 1 > 80) {print FILENAME ":" start ": " FNR - start - 1 " lines"; bad = 1} start = 0}
          END {exit bad}' $sources
 }
+impatient() { # what a test waits for takes PATIENT_S where it never comes: another period has a reason beside it
+    ! grep -nE 'monotonic\(\) \+ [0-9.]+ *$' tests/{api,browser}/*.py
+}
 shell_syntax() {
     local file bad=0
     for file in $(find tests .ci -name '*.sh' -o -path '.ci/*'); do bash -n "$file" || bad=1; done
@@ -93,6 +96,7 @@ check rooms python3 -B tests/rooms.py
 check file_length long_files
 check interface_length long_interfaces
 check function_length long_functions
+check patience impatient
 check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'

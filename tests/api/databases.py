@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import time
 
-from service import Skip, check
+from service import PATIENT_S, Skip, check
 
 SCRIPT = pathlib.Path(__file__).resolve().parent.parent / "postgresql.sh"
 
@@ -42,7 +42,7 @@ class Server:
         os.chmod(self.folder, 0o711)
         with open(os.path.join(self.folder, "log"), "ab") as log:
             self.process = subprocess.Popen([SCRIPT, self.folder, *self.settings], stdout=log, stderr=log)
-        end = time.monotonic() + 180  # a machine that has much to do takes its time for initdb
+        end = time.monotonic() + PATIENT_S  # a machine that has much to do takes its time for initdb
         while self.process.poll() is None and time.monotonic() < end:
             if os.path.exists(os.path.join(self.folder, f".s.PGSQL.{port}")) and self.try_sql("postgres", "SELECT 1")[0]:
                 return

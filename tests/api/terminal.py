@@ -8,6 +8,8 @@ import struct
 import termios
 import time
 
+from service import PATIENT_S
+
 
 class Screen:
     """Plays what a program writes: printable text, \\r, \\n, \\b, ESC [K and colours. `lines` is what is on the screen, `shown`
@@ -103,14 +105,14 @@ class Terminal:
         self.screen.feed(data.decode("utf-8", "replace"))
         return bool(data)
 
-    def until(self, condition, seconds=30):
+    def until(self, condition, seconds=PATIENT_S):
         """Reads until condition(screen) holds."""
         end = time.monotonic() + seconds
         while not condition(self.screen):
             if time.monotonic() > end or not self.read(0.1):
                 raise AssertionError(f"it was never seen; the screen has:\n{self.screen.text}\nbefore: {self.screen.shown}")
 
-    def end(self, seconds=60):
+    def end(self, seconds=PATIENT_S):
         """Reads to the end and returns the exit status."""
         end = time.monotonic() + seconds
         while self.read(0.1):

@@ -15,7 +15,7 @@ import tempfile
 import time
 
 import service
-from service import ENDLESS, MATRICES, Skip, check, expect, options
+from service import ENDLESS, MATRICES, PATIENT_S, Skip, check, expect, options, wait_until
 
 READ, SUBMIT, ADMIN = "r" * 20, "s" * 20, "a" * 20
 FOLDER = tempfile.TemporaryDirectory(prefix="uzawad-auth-")
@@ -37,7 +37,7 @@ def bearer(secret):
 
 def run(s, *arguments):
     return subprocess.run(s.command("--db", os.path.join(s.folder, "x.db"), *arguments), capture_output=True, text=True,
-                          timeout=30, check=False)
+                          timeout=PATIENT_S, check=False)
 
 
 @options("--token-file", TOKENS)
@@ -136,11 +136,9 @@ def test_reload(s):
 
     def reload(text, event):
         write_tokens(text, path=path)
-        s.process.send_signal(signal.SIGHUP)
-        end = time.monotonic() + 10
         seen = len(s.events(event))
-        while len(s.events(event)) == seen and time.monotonic() < end:
-            time.sleep(0.02)
+        s.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: len(s.events(event)) > seen)
 
     check(s.request("GET", "/v1/jobs", None, bearer(READ)).status == 200)
     reload(f"two read {SUBMIT}\n", "tokens_reloaded")
@@ -174,7 +172,7 @@ def test_public_address(s):
                               stderr=subprocess.DEVNULL) as process:
             line = process.stdout.readline().decode()
             process.send_signal(signal.SIGTERM)
-            check(line.startswith("listening on http://0.0.0.0:") and process.wait(timeout=20) == 0, line)
+            check(line.startswith("listening on http://0.0.0.0:") and process.wait(timeout=PATIENT_S) == 0, line)
 
 
 @options("--max-client-rate", "5")
@@ -185,7 +183,7 @@ def test_rate(s):
     expect(limited[0], 429, "too_many_requests")
     check(int(limited[0].headers["retry-after"]) >= 1, limited[0])
     check(s.get("/healthz").status == 200, "a supervisor must get through")
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while s.get("/v1/jobs").status == 429 and time.monotonic() < end:
         time.sleep(0.1)
     check(time.monotonic() < end, "it never lets go")
@@ -212,11 +210,11 @@ def test_connections_of_one_client(s):
     for one in held:
         one.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
         check(one.recv(100).startswith(b"HTTP/1.1 200"))
-    _, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=5)
+    _, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=PATIENT_S)
     check(closed, "a fourth connection was served")
     for one in held:
         one.close()
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENT_S
     while time.monotonic() < end:
         try:
             if s.get("/healthz").status == 200:
@@ -250,7 +248,7 @@ def test_tls(s):
             context = ssl.create_default_context(cafile=cert)
 
             def ask(method, path, body=None, headers=None):
-                connection = http.client.HTTPSConnection("127.0.0.1", port, context=context, timeout=20)
+                connection = http.client.HTTPSConnection("127.0.0.1", port, context=context, timeout=PATIENT_S)
                 try:
                     connection.request(method, path, body, {"Content-Type": "application/json", **(headers or {})} if body else headers or {})
                     reply = connection.getresponse()
@@ -304,7 +302,7 @@ def test_tls(s):
                 check(not handshake(port, *old), old)
         finally:
             process.send_signal(signal.SIGTERM)
-            _, log = process.communicate(timeout=30)
+            _, log = process.communicate(timeout=PATIENT_S)
         check(process.returncode == 0, log)
         check(b"certificate_reloaded" in log and b"certificate_kept" in log and b"open to every user" in log, log)
     got = run(s, "--listen", "127.0.0.1:0", "--tls-cert", cert, "--tls-key", key)
@@ -317,7 +315,7 @@ def test_tls(s):
 
 def handshake(port, *options):
     done = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{port}", "-brief", *options], input=b"", capture_output=True,
-                          timeout=20, check=False)
+                          timeout=PATIENT_S, check=False)
     return done.returncode == 0 and b"CONNECTION ESTABLISHED" in done.stdout + done.stderr
 
 
@@ -326,7 +324,7 @@ def renew(process, port, cert, key, fresh):
     os.replace(fresh[0], cert)
     os.replace(fresh[1], key)
     process.send_signal(signal.SIGHUP)
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while ssl.get_server_certificate(("127.0.0.1", port)) == before:
         check(time.monotonic() < end, "the certificate is never the new one")
         time.sleep(0.02)
@@ -334,7 +332,7 @@ def renew(process, port, cert, key, fresh):
 
 def socket_to(port):
     import socket
-    return socket.create_connection(("127.0.0.1", port), timeout=20)
+    return socket.create_connection(("127.0.0.1", port), timeout=PATIENT_S)
 
 
 @options(None)

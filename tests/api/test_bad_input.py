@@ -9,7 +9,7 @@ import socket
 import time
 
 import service
-from service import MATRICES, SCENE, check, expect, head_of, read_all
+from service import MATRICES, PATIENT_S, SCENE, check, expect, head_of, read_all
 
 SHARED = True  # one service for all tests
 
@@ -429,7 +429,7 @@ LIMIT, HUGE = 64 << 20, 100 << 20
 
 def send(s, head, piece, count):
     """Sends it all, as far as the daemon takes it, and returns what came back."""
-    with s.connect(timeout=30) as c:
+    with s.connect(timeout=PATIENT_S) as c:
         try:
             c.sendall(head)
             for _ in range(count):

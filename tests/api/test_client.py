@@ -11,7 +11,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from service import check, options
+from service import PATIENT_S, check, options
 
 SHARED = True  # one service for all tests
 
@@ -310,7 +310,7 @@ def test_wait_survives_a_restart(server):
 def test_server_from_the_environment(server):
     server.start()
     run(None, "list", code=0, UZAWA_SERVER=server.url)
-    run(None, "list", code=12, UZAWA_SERVER="http://127.0.0.1:1", seconds=30)
+    run(None, "list", code=12, UZAWA_SERVER="http://127.0.0.1:1", seconds=PATIENT_S)
     run(server, "list", code=0, UZAWA_SERVER="http://127.0.0.1:1")
 
 

@@ -11,7 +11,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from service import ROOT, Skip, check, options
+from service import PATIENT_S, ROOT, Skip, check, options
 from terminal import Terminal
 from test_client_requests import DECK, GMSH
 
@@ -112,7 +112,7 @@ COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1))
 _uzawa
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
-    done = subprocess.run(["bash", "--norc", "-c", script], capture_output=True, text=True, cwd=cwd, timeout=30,
+    done = subprocess.run(["bash", "--norc", "-c", script], capture_output=True, text=True, cwd=cwd, timeout=PATIENT_S,
                           env={**os.environ, "LINE": line, "UZAWA_SERVER": server.url if server else "http://127.0.0.1:1",
                                "PATH": f"{BUILD}:{os.environ['PATH']}"})
     check(done.returncode == 0 and done.stderr == "", line, done)

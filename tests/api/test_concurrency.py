@@ -8,7 +8,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, PUSHED_OFF, SCENE, check, expect, options, wait_until
+from service import ENDLESS, MATRICES, PATIENT_S, PUSHED_OFF, SCENE, check, expect, options, wait_until
 
 ENERGY, REACTION_SUM = -3.9608186040e-3, -10.51371700  # of the scene
 CLIENTS = 8
@@ -22,7 +22,7 @@ def together(count, work):
 
     def run(i):
         try:
-            barrier.wait(timeout=30)
+            barrier.wait(timeout=PATIENT_S)
             results[i] = work(i)
         except Exception as why:  # noqa: raised again below
             failures.append(why)
@@ -208,7 +208,7 @@ def test_unlike_jobs_at_once(s):
 def wait_for_rows(s, job_id):
     """Until the job iterates."""
     s.wait_status(job_id, "running")
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + PATIENT_S
     while not expect(s.get(f"/v1/jobs/{job_id}/history"), 200).json["rows"]:
         check(time.monotonic() < deadline, "no iteration yet", job_id)
         time.sleep(0.005)
@@ -294,14 +294,14 @@ def test_live_readers(s):
     """A running job's history read by many: rows ascend, none comes twice, and the tail is what the whole has."""
     job_id = s.post(ENDLESS).json["id"]
     s.wait_status(job_id, "running")
-    until = time.monotonic() + 60
+    until = time.monotonic() + PATIENT_S
     while not s.get(f"/v1/jobs/{job_id}/history").json["rows"] and time.monotonic() < until:
         time.sleep(0.05)
 
     def work(_):
         after, seen = -1, []
         for _ in range(10):
-            connection = http.client.HTTPConnection(s.host, s.port, timeout=30)
+            connection = http.client.HTTPConnection(s.host, s.port, timeout=PATIENT_S)
             connection.request("GET", f"/v1/jobs/{job_id}/history?after={after}")
             rows = json.loads(connection.getresponse().read())["rows"]
             connection.close()

@@ -8,11 +8,11 @@ import shutil
 import subprocess
 
 import service
-from service import MATRICES, SCENE, Skip, check, expect, options, wait_until
+from service import MATRICES, PATIENT_S, SCENE, Skip, check, expect, options, wait_until
 
 
 def run(s, *arguments, **environment):
-    return subprocess.run(s.command(*arguments), capture_output=True, text=True, timeout=30, check=False,
+    return subprocess.run(s.command(*arguments), capture_output=True, text=True, timeout=PATIENT_S, check=False,
                           env={**os.environ, **environment})
 
 
@@ -140,7 +140,7 @@ def test_pipes_that_nobody_writes_to(s):
     end, into = os.pipe()
     os.write(into, b"workers = 3\n")
     os.close(into)
-    got = subprocess.run(s.command("--check-config", "--config", f"/dev/fd/{end}"), pass_fds=[end], capture_output=True, text=True, timeout=30, check=False)
+    got = subprocess.run(s.command("--check-config", "--config", f"/dev/fd/{end}"), pass_fds=[end], capture_output=True, text=True, timeout=PATIENT_S, check=False)
     os.close(end)
     check(got.returncode == 0 and "workers = 3" in got.stdout, got)
 

@@ -6,7 +6,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, MATRICES, PATIENT_S, SCENE, check, expect, options
 
 
 class Stream:
@@ -15,7 +15,7 @@ class Stream:
 
     def __init__(self, s, job_id, last=None):
         self.comments = 0
-        self.connection = http.client.HTTPConnection(s.host, s.port, timeout=30)
+        self.connection = http.client.HTTPConnection(s.host, s.port, timeout=PATIENT_S)
         path = f"/v1/jobs/{job_id}/events" if job_id else "/v1/events"
         self.connection.request("GET", path, headers={"Last-Event-ID": last} if last else {})
         self.reply = self.connection.getresponse()
@@ -25,7 +25,7 @@ class Stream:
         check(self.reply.getheader("content-type") == "text/event-stream", self.reply.getheaders())
 
     def __iter__(self):
-        fields, end = {}, time.monotonic() + 120
+        fields, end = {}, time.monotonic() + PATIENT_S
         while line := self.reply.readline():
             check(time.monotonic() < end, "nothing but", self.comments, "comments for long")
             line = line.decode().rstrip("\n")
@@ -36,7 +36,7 @@ class Stream:
                 fields[name] = value
             elif fields:
                 yield fields["event"], fields["id"], json.loads(fields["data"])
-                fields, end = {}, time.monotonic() + 120
+                fields, end = {}, time.monotonic() + PATIENT_S
 
     def close(self):
         self.reply.close()
@@ -127,8 +127,9 @@ def test_streams_leave_connections(s):
     reply = expect(s.get(f"/v1/jobs/{job['id']}/events"), 503, "too_many_streams")
     check(int(reply.headers["retry-after"]) > 0, reply)
     streams[0].close()
-    end = time.monotonic() + 10
-    while time.monotonic() < end:
+    end = time.monotonic() + PATIENT_S
+    while True:
+        check(time.monotonic() < end, "there is no room for another")
         try:
             streams[0] = Stream(s, job["id"])
             break

@@ -8,7 +8,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, check, expect, head_of, options, read_all, wait_until
+from service import ENDLESS, MATRICES, PATIENT_S, check, expect, head_of, options, read_all, wait_until
 
 LONG = 1.5  # seconds after which a long poll has given up its thread
 
@@ -19,7 +19,7 @@ def threads(s):
 
 def ask(s, path, fields="", method="GET", body=b""):
     """A connection that has sent this request."""
-    c = s.connect(timeout=30)
+    c = s.connect(timeout=PATIENT_S)
     length = f"Content-Length: {len(body)}\r\nContent-Type: application/json\r\n" if body else ""
     c.sendall(f"{method} {path} HTTP/1.1\r\nHost: x\r\n{length}{fields}\r\n".encode() + body)
     return c
@@ -86,7 +86,7 @@ def test_form_of_a_stream(s):
         check(fields["content-type"] == "text/event-stream" and "date" in fields and "x-request-id" in fields, fields)
         text, whole = dechunk(body)
         check(whole and text.endswith(b"\n\n") and text.count(b"event: status\n") >= 2, text)
-    with s.connect(timeout=30) as c:  # which knows no chunks
+    with s.connect(timeout=PATIENT_S) as c:  # which knows no chunks
         c.sendall(f"GET /v1/jobs/{job}/events HTTP/1.0\r\n\r\n".encode())
         status, fields, body = head_of(read_all(c)[0])
         check(status == 200 and "transfer-encoding" not in fields and body.startswith(b"event: status\n"), fields, body)
@@ -191,7 +191,7 @@ def test_they_count_as_connections(s):
     held = [ask(s, "/v1/events") for _ in range(8)]
     for c in held:
         stream_start(c)
-    _, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=5)
+    _, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=PATIENT_S)
     check(closed, "a ninth connection was served")
     held.pop().close()
     wait_until(lambda: s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=1)[0].startswith(b"HTTP/1.1 200"))
@@ -204,7 +204,7 @@ def test_they_count_for_their_client(s):
     held = [ask(s, "/v1/events") for _ in range(3)]
     for c in held:
         stream_start(c)
-    data, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=5)
+    data, closed = s.raw(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", timeout=PATIENT_S)
     check(closed and not data, "a fourth connection was served", data)
     for c in held:
         c.close()
@@ -213,7 +213,7 @@ def test_they_count_for_their_client(s):
 
 def test_many_come_and_go(s):
     """Streams and long polls that begin, are told and are left in any order, beside jobs that end."""
-    stop = time.monotonic() + 4
+    stop = time.monotonic() + 4  # seconds of coming and going
 
     def follow(number):
         while time.monotonic() < stop:

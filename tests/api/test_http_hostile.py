@@ -9,7 +9,7 @@ import socket
 import time
 
 import service
-from service import MATRICES, SCENE, check, expect, head_of, options, read_all, wait_until
+from service import MATRICES, PATIENT_S, SCENE, check, expect, head_of, options, read_all, wait_until
 
 # ----------------------------------------------------------------- framing
 
@@ -19,7 +19,7 @@ SMUGGLED = b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
 
 def refused(s, data, statuses=(400,)):
     """One refusal comes back, nothing after it is served, and the connection closes."""
-    reply, closed = s.raw(data, timeout=5)
+    reply, closed = s.raw(data, timeout=PATIENT_S)
     status, fields, body = head_of(reply)
     check(status in statuses and closed, data[:200], "->", status, closed, reply[:300])
     check(reply.count(b"HTTP/1.1 ") == 1, "a second request was served", data[:200], reply)
@@ -134,7 +134,7 @@ def test_chunks_end_in_cr_lf(s):
         refused(s, head + bad + SMUGGLED)
         data, _ = s.raw(SMUGGLED + head + bad + SMUGGLED)
         check(data.count(b"HTTP/1.1 200") == 1 and data.count(b"HTTP/1.1 400") == 1, bad, data)
-        with s.connect(timeout=5) as c:
+        with s.connect(timeout=PATIENT_S) as c:
             c.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             c.sendall(head)
             reply, closed = trickle(c, bad + SMUGGLED, 0.002)
@@ -145,7 +145,7 @@ def test_chunks_end_in_cr_lf(s):
     # what is right is taken, also twice on a connection and with what is beyond it
     data, _ = s.raw(SMUGGLED + head + good + head + good + SMUGGLED.replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n"))
     check(data.count(b"HTTP/1.1 200") == 2 and data.count(b"HTTP/1.1 422") == 2, data)
-    with s.connect(timeout=5) as c:
+    with s.connect(timeout=PATIENT_S) as c:
         for _ in range(3):
             c.sendall(head)
             for i in range(len(good)):
@@ -193,7 +193,7 @@ def test_body_too_large(s):
     big = b" " * 10241
     for expect_field in (b"", b"Expect: 100-continue\r\n"):
         # Only the head is sent: the refusal must not wait for the body.
-        with s.connect(timeout=5) as c:
+        with s.connect(timeout=PATIENT_S) as c:
             c.sendall(POST + expect_field + b"Content-Length: 10241\r\n\r\n")
             data = c.recv(65536)
             status, fields, body = head_of(data)
@@ -210,7 +210,7 @@ def test_body_too_large(s):
 
 def test_expect_continue(s):
     body = json.dumps(MATRICES).encode()
-    with s.connect(timeout=5) as c:
+    with s.connect(timeout=PATIENT_S) as c:
         c.sendall(POST + b"Expect: 100-continue\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body))
         check(c.recv(100).startswith(b"HTTP/1.1 100 Continue\r\n\r\n"))
         c.sendall(body)
@@ -243,7 +243,7 @@ def test_slow_requests(s):
                            (b"GET /" + b"y" * 1000 + b" HTTP/1.1\r\n\r\n", False),
                            (POST + b"Content-Length: 900\r\n\r\n" + b" " * 900, True),
                            (POST + b"Transfer-Encoding: chunked\r\n\r\n" + b"1\r\n \r\n" * 900, True)):
-        with s.connect(timeout=30) as c:
+        with s.connect(timeout=PATIENT_S) as c:
             started = time.monotonic()
             c.sendall(data[:-800])
             reply, closed = trickle(c, data[-800:], 0.05)
@@ -258,7 +258,7 @@ def test_slow_requests(s):
 
 @options("--request-deadline-s", "1")
 def test_idle_connections_close(s):
-    with s.connect(timeout=30) as c, s.connect(timeout=30) as silent:
+    with s.connect(timeout=PATIENT_S) as c, s.connect(timeout=PATIENT_S) as silent:
         c.sendall(SMUGGLED)
         started = time.monotonic()
         data, closed = read_all(c)
@@ -270,7 +270,7 @@ def test_idle_connections_close(s):
 def test_half_sent_requests_go_first(s):
     """However many there are, whoever asks is served; streams and idle connections stay."""
     job = s.post(SCENE, {"Prefer": "wait=20"}).json["id"]
-    with s.connect(timeout=10) as stream, s.connect(timeout=10) as idle:
+    with s.connect(timeout=PATIENT_S) as stream, s.connect(timeout=PATIENT_S) as idle:
         stream.sendall(b"GET /v1/events HTTP/1.1\r\nHost: x\r\n\r\n")
         check(stream.recv(4096).startswith(b"HTTP/1.1 200"))
         idle.sendall(SMUGGLED)

@@ -7,7 +7,7 @@ import time
 import urllib.request
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, MATRICES, PATIENT_S, SCENE, check, expect, options
 
 SHARED = True  # one service for all tests
 
@@ -181,7 +181,7 @@ def test_a_job_that_runs(s):
     request = {**ENDLESS, "cases": [{"name": "none", "loads": []}, {"name": "heavy", "loads": LOADS["heavy"]}]}
     job = expect(s.post(request), 202).json["id"]
     s.wait_status(job, "running")
-    end = time.monotonic() + 30
+    end = time.monotonic() + PATIENT_S
     while (live := expect(s.get(f"/v1/jobs/{job}/history"), 200).json).get("case") != "heavy" or len(live["rows"]) < 3:
         check(time.monotonic() < end, live)
         time.sleep(0.02)

@@ -13,7 +13,7 @@ import threading
 import time
 
 import service
-from service import INSTRUMENTED, MATRICES, SCENE, Skip, check, expect, options
+from service import INSTRUMENTED, MATRICES, PATIENT_S, SCENE, Skip, check, expect, options
 
 
 def plate(cells, **solver):
@@ -188,7 +188,7 @@ def test_the_next_body_lands_on_memory_that_is_there(s):
         tries += 1
         check(tries < 5, memory_shared(s))
         s.solve(body)
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while memory_shared(s) > 1.2:
         check(time.monotonic() < end, memory_shared(s))
         time.sleep(0.2)

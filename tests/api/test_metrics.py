@@ -4,7 +4,7 @@ import resource
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, MATRICES, PATIENT_S, SCENE, check, expect, options
 
 LINE = re.compile(r'([a-zA-Z_:][a-zA-Z0-9_:]*)(?:\{(.*)\})? (-?[0-9.e+-]+|\+Inf|NaN)$')
 
@@ -32,7 +32,7 @@ def scrape(s):
 
 def scrape_after(s, solved, failed=0):
     """The values once so many jobs were counted: a job is counted just after its end can be read, its phases last."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while True:
         values = scrape(s)
         if (values["uzawad_job_phase_seconds_count", 'phase="certify"'] == solved and
@@ -96,7 +96,7 @@ def test_queue_and_workers(s):
     for one in waiting:
         s.wait_status(one, "successful")
     s.wait_status(job["id"], "dismissed")
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     dismissed = {}
     while not dismissed and time.monotonic() < end:  # stopped before its first iteration it has no outcome
         now = scrape(s)
@@ -132,7 +132,7 @@ def test_ready_finds_a_full_disk(s):
 
 def counted(s, name, labels, value):
     """A job is counted just after its end is told."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while (now := scrape(s)).get((name, labels)) != value:
         check(time.monotonic() < end, name, labels, now)
         time.sleep(0.02)

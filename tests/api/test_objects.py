@@ -13,7 +13,7 @@ import time
 import databases
 import object_store
 import service
-from service import MATRICES, SCENE, Service, check, expect, together, wait_until
+from service import MATRICES, PATIENT_S, SCENE, Service, check, expect, together, wait_until
 
 SERVER = None
 LARGE = {**SCENE, "tags": ["large"]}
@@ -154,7 +154,7 @@ def test_a_daemon_is_killed_between_object_and_row(s):
         with place.failing("hang", "PUT"):
             job = a.post(LARGE).json["id"]
             upload = concurrent.futures.ThreadPoolExecutor(1).submit(
-                lambda: a.request("POST", "/v1/uploads", os.urandom(5000), timeout=5))
+                lambda: a.request("POST", "/v1/uploads", os.urandom(5000), timeout=PATIENT_S))
             wait_until(lambda: place.count("PUT") >= 2)
             runs_at_a = bool(a.events("job_started"))
             killed, other = (a, b) if runs_at_a else (b, a)
@@ -269,7 +269,7 @@ def test_a_start_says_what_is_wrong(s):
         def told(*options, **environment):
             run = subprocess.run(a.command("--listen", "127.0.0.1:0", "--db", a.db, "--objects", place.url(),
                                            "--object-region", object_store.REGION, *options), capture_output=True,
-                                 text=True, timeout=30, check=False, env={**os.environ, **KEYS, **environment})
+                                 text=True, timeout=PATIENT_S, check=False, env={**os.environ, **KEYS, **environment})
             check(run.returncode == 1, run)
             return run.stderr
         key_file = os.path.join(a.folder, "keys")

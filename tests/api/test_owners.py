@@ -10,7 +10,7 @@ import tempfile
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, MATRICES, PATIENT_S, SCENE, check, expect, options
 
 OLD, NEW, VIEW, BOB, LATE, BOSS = ("alice-old-" + "1" * 16, "alice-new-" + "2" * 16, "alice-view-" + "3" * 16, "bob-" + "4" * 16,
                                    "late-" + "5" * 16, "boss-" + "6" * 16)
@@ -125,7 +125,7 @@ def test_uploads(s):
     check(not s.kept_uploads())
 
 
-def told(c, *wanted, seconds=20):
+def told(c, *wanted, seconds=PATIENT_S):
     """What a stream tells, until all that is wanted was among it."""
     text, end = "", time.monotonic() + seconds
     while not all(one in text for one in wanted):
@@ -138,7 +138,7 @@ def told(c, *wanted, seconds=20):
 def test_events(s):
     streams = {}
     for secret in (VIEW, BOB, BOSS):
-        streams[secret] = c = s.connect(timeout=20)
+        streams[secret] = c = s.connect(timeout=PATIENT_S)
         c.sendall(f"GET /v1/events HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {secret}\r\n\r\n".encode())
         check(b"200" in c.recv(20))
     jobs = {secret: solved(s, secret) for secret in (OLD, BOB)}
@@ -167,7 +167,7 @@ def test_tokens(s):
     write_tokens(LINES + f"soon read {'s' * 20} until={soon}\n")
     try:
         s.process.send_signal(service.signal.SIGHUP)
-        end = time.monotonic() + 20
+        end = time.monotonic() + PATIENT_S
         while ask(s, "s" * 20, "GET", "/v1/jobs").status != 200:
             check(time.monotonic() < end, s.log())
             time.sleep(0.02)
@@ -182,7 +182,7 @@ def test_tokens(s):
         write_tokens(LINES + line + "\n")
         try:
             done = service.subprocess.run(s.command("--check-config", "--token-file", TOKENS), capture_output=True, text=True,
-                                          timeout=30, check=False)
+                                          timeout=PATIENT_S, check=False)
         finally:
             write_tokens(LINES)
         check(done.returncode == 1 and ":8:" in done.stderr and why in done.stderr and "x" * 20 not in done.stderr, line, done.stderr)
@@ -192,7 +192,7 @@ def test_tokens(s):
 def test_quotas(s):
     """What one owner has counts for that one alone."""
     running = expect(ask(s, BOSS, "POST", "/v1/jobs", ENDLESS), 202).json["id"]
-    end = time.monotonic() + 30
+    end = time.monotonic() + PATIENT_S
     while ask(s, BOSS, "GET", f"/v1/jobs/{running}").json["status"] != "running":
         check(time.monotonic() < end)
         time.sleep(0.02)

@@ -15,7 +15,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from service import ROOT, Skip, check, options
+from service import PATIENT_S, ROOT, Skip, check, options
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^(<!-- not run: [^\n]+ -->\n)?```sh\n(.*?)^```$", re.M | re.S)
@@ -223,7 +223,7 @@ def test_references_are_complete(s):
     check(len(words) > 60 and "mesh_limit" in words and "locking" in words, words)
     missing = [word for word in words if f"`{word}`" not in text]
     check(not missing, "docs/http.md says nothing about", missing)
-    told = subprocess.run([f"{s.build}/uzawad", "--help"], capture_output=True, text=True, timeout=20).stdout
+    told = subprocess.run([f"{s.build}/uzawad", "--help"], capture_output=True, text=True, timeout=PATIENT_S).stdout
     flags = set(re.findall(r"--[a-z-]+[a-z]", told))
     check(len(flags) > 40, flags)
     missing = [flag for flag in sorted(flags) if f"`{flag}`" not in (ROOT / "docs/operations.md").read_text()]

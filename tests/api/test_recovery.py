@@ -19,7 +19,7 @@ import threading
 import time
 
 import service
-from service import ENDLESS, INSTRUMENTED, MATRICES, SCENE, check, expect, options, wait_until
+from service import ENDLESS, INSTRUMENTED, MATRICES, PATIENT_S, SCENE, check, expect, options, wait_until
 
 ALL_FIELDS = "?fields=summary,reactions,gaps,displacements"
 
@@ -202,7 +202,7 @@ def test_killed_during_submission(s):
     promised, energies = {}, {}
     for count in (1, 8, 25):
         submitters = Submitters(s, 4)
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENT_S
         while len(submitters.acknowledged) < count and time.monotonic() < end:
             time.sleep(0.002)
         s.process.kill()

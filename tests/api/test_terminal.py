@@ -10,7 +10,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from service import check, options
+from service import PATIENT_S, check, options
 from terminal import Screen, Terminal
 
 SHARED = True  # one service for all tests
@@ -128,7 +128,7 @@ def test_interrupt_without_a_terminal(server):
                                stderr=subprocess.PIPE, text=True)
     time.sleep(1)
     waiting.send_signal(signal.SIGINT)
-    out, err = waiting.communicate(timeout=30)
+    out, err = waiting.communicate(timeout=PATIENT_S)
     check(waiting.returncode == 130 and json.loads(err)["exit"] == 130, waiting.returncode, out, err)
     check(not out or json.loads(out)["id"] == job, out)
     # A shell's background job does not hear of a Ctrl-C that is meant for another.
@@ -139,7 +139,7 @@ def test_interrupt_without_a_terminal(server):
     time.sleep(0.5)
     check(waiting.poll() is None, "it was ignored and must stay so")
     run(server, "cancel", job)
-    waiting.communicate(timeout=30)
+    waiting.communicate(timeout=PATIENT_S)
     check(waiting.returncode == 9, waiting.returncode)
 
 

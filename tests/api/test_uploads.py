@@ -10,7 +10,7 @@ import time
 
 import gmsh_files
 import service
-from service import MATRICES, ROOT, Skip, check, expect, options
+from service import MATRICES, PATIENT_S, ROOT, Skip, check, expect, options
 
 K, N = (MATRICES["problem"][name].encode() for name in "KN")
 VECTOR = b"%%MatrixMarket matrix array real general\n2 1\n2\n2\n"
@@ -238,7 +238,7 @@ def test_what_is_unused_goes_by_age(s):
     expect(send(s, K), 201)
     check(s.solve(with_uploads(K=digest(K)))["status"] == "successful")
     expect(send(s, VECTOR), 201)
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENT_S
     while digest(VECTOR) in files(s) and time.monotonic() < end:
         time.sleep(0.1)
     check(files(s) == [digest(K)], files(s))
@@ -250,7 +250,7 @@ def start_sending(s, text, count):
     c = s.connect()
     c.sendall(b"POST /v1/uploads HTTP/1.1\r\nHost: x\r\nContent-Type: application/octet-stream\r\n"
               b"Content-Length: %d\r\n\r\n" % len(text) + text[:count])
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while not any(name.startswith("incoming-") and (folder(s) / name).stat().st_size >= count for name in files(s)):
         check(time.monotonic() < end, files(s))
         time.sleep(0.01)
@@ -261,7 +261,7 @@ def test_a_broken_send_leaves_nothing(s):
     s.file()  # what is half written lies beside it
     text = random.Random(1).randbytes(300000)
     start_sending(s, text, 100000).close()
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while files(s) and time.monotonic() < end:
         time.sleep(0.02)
     check(files(s) == [], files(s))

@@ -243,7 +243,7 @@ def test_what_ends_the_telling(s):
     s.sql("UPDATE webhook SET state = 1, next = 0, attempts = 1 WHERE job = ?", (gone["id"],))
     s.options = ("--keep-jobs", "1")
     s.start()
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENT_S
     while s.get(f"/v1/jobs/{gone['id']}").status != 404:  # without webhooks too a job does not stay for ever for one
         check(time.monotonic() < end, s.log())
         time.sleep(0.05)
