@@ -75,7 +75,7 @@ class JobView {
 
   /** What was asked, fetched when somebody looks. */
   show_request() {
-    const place = h("pre", { class: "request-text", tabindex: "0", "aria-label": "The request in JSON" });
+    const place = h("pre", { class: "request-text", tabindex: "0", role: "region", "aria-label": "The request in JSON" });
     const details = h("details", { ontoggle: async () => {
       if (!details.open || place.textContent) return;
       try {
