@@ -5,6 +5,7 @@ import http.client
 import json
 import os
 import pathlib
+import signal
 import sqlite3
 import tempfile
 import threading
@@ -288,11 +289,14 @@ def test_keep_bytes(s):
     wait_until(lambda: listed(s) == [jobs[3], jobs[2]])
 
 
-@options("--keep-jobs", "1", "--upload-days", "0.000001")
+@options(None)
 def test_an_upload_goes_after_its_job(s):
+    s.start()
     text = MATRICES["problem"]["K"].encode()
     one = s.request("POST", "/v1/uploads", text).json["id"]
     s.solve({"problem": {**MATRICES["problem"], "K": {"upload": one}}})
+    s.options = ("--keep-jobs", "1", "--upload-days", "0.000001")  # from here on: before, it could go before its job came
+    s.restart(signal.SIGTERM)
     check(s.get(f"/v1/uploads/{one}").json["used_by"] == 1)
     s.solve(MATRICES)
     wait_until(lambda: s.get(f"/v1/uploads/{one}").status == 404)

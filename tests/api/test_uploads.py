@@ -5,6 +5,7 @@ import os
 import pathlib
 import random
 import resource
+import signal
 import threading
 import time
 
@@ -233,11 +234,14 @@ def test_refusals(s):
     check(s.get("/v1/jobs").json["jobs"] == [])
 
 
-@options("--upload-days", "0.00001", "--workers", "1")
+@options(None)
 def test_what_is_unused_goes_by_age(s):
+    s.start()
     expect(send(s, K), 201)
     check(s.solve(with_uploads(K=digest(K)))["status"] == "successful")
     expect(send(s, VECTOR), 201)
+    s.options = ("--upload-days", "0.00001")  # from here on: before, K could go before its job came
+    s.restart(signal.SIGTERM)
     end = time.monotonic() + PATIENT_S
     while digest(VECTOR) in files(s) and time.monotonic() < end:
         time.sleep(0.1)
