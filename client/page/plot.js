@@ -168,7 +168,7 @@ export class Chart {
   constructor(element, height = 300) {
     this.element = element;
     this.height = height;
-    this.svg = s("svg", { class: "chart", role: "img" });
+    this.svg = s("svg", { class: "chart", role: "img", "aria-label": "nothing to show yet" });
     this.legend = h("div", { class: "legend" });
     this.readout = h("div", { class: "readout muted", "aria-hidden": "true" });
     this.what = null;
