@@ -273,13 +273,15 @@ def test_half_sent_requests_go_first(s):
     with s.connect(timeout=PATIENT_S) as stream, s.connect(timeout=PATIENT_S) as idle:
         stream.sendall(b"GET /v1/events HTTP/1.1\r\nHost: x\r\n\r\n")
         check(stream.recv(4096).startswith(b"HTTP/1.1 200"))
+        began = time.monotonic()
         idle.sendall(SMUGGLED)
         check(idle.recv(4096).startswith(b"HTTP/1.1 200"))
         half = []
         for _ in range(100):
             half.append(s.connect())
             half[-1].sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n")
-        time.sleep(3 if service.INSTRUMENTED else 0.3)  # so old are half-sent ones, once read, before the idle one counts as much
+        # So old are half-sent ones, once read, before the idle one counts as much, of whose time it is a tenth.
+        time.sleep((3 if service.INSTRUMENTED else 0.3) + 0.3 * (time.monotonic() - began))
         for _ in range(30):
             started = time.monotonic()
             check(s.get(f"/v1/jobs/{job}").status == 200 and time.monotonic() - started < 40)
