@@ -84,7 +84,7 @@ static bool may_hold(const free_load *x)
 
 /* Where few of the dofs have bounds a step of the active set costs no more than sweeps over them all. */
 #define FEW_BOUNDS 0.125
-enum { REFUSED_MOST = 8 };
+enum { REFUSED_MOST = 20 };
 
 static bool are_few(int64_t m, int64_t d)
 {

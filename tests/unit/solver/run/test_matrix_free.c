@@ -413,6 +413,37 @@ TEST(predicted_bytes_cover_what_is_used)
         }
 }
 
+/* A plate that is pressed on a plane and lifted at its end: a dozen guesses, none of which takes sweeps over the region
+ * around the contact, with their copy of K. */
+TEST(many_guesses_of_few_rows_take_no_more_room)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(30, 3, 30, 3)};
+    uz_scene *scene = &problem.scene;
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    scene->model = UZ_SOLID;
+    scene->kinematics = UZ_KINEMATICS_FIXED;
+    scene->box.dim = 3;
+    scene->box.size[2] = 30;
+    scene->box.cells[2] = 30;
+    snprintf(scene->box.element, sizeof scene->box.element, "tet4");
+    scene->materials[0].young = 1000;
+    scene->materials[0].poisson = 0.3;
+    add_support(scene, "left", 0, 0);
+    scene->supports[0].u[2] = 0;
+    add_load(scene, "top", 0, -0.02);
+    add_load(scene, "right", 0.2, 0.05);
+    add_plane(scene, "bottom", 0, -0.02, 0, 1);
+    uz_result *result = solve_problem(&problem, &s);
+    if (result) {
+        const uz_cost *cost = &result->summary.cost;
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK_MSG(result->summary.iterations > 9, "%lld iterations", (long long)result->summary.iterations);
+        CHECK_MSG(cost->actual_bytes <= cost->bytes, "%g predicted, %g counted", cost->bytes, cost->actual_bytes);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
 /* Solids of a hundred thousand dofs with factors of more and more flops: the factor is made while it costs less than
  * two seconds or than twice what the multigrid does, and not beyond; for many load cases while it costs less. */
 static void check_dear_factors(int64_t cases)
