@@ -18,6 +18,7 @@ typedef struct {
     double stretch;    /* longest over shortest distance of an element's corners, of a solid */
     double slender;    /* longest over second longest side of the box around a solid */
     double firmness;   /* what its material resists of a change of volume, over that of a Poisson's ratio of 0.3 */
+    bool irregular;    /* tetrahedra that lie as in no grid */
     double entry_s;    /* for an entry of K (uz_cost_rates), where K is large; 0: that of the machine */
     double cycle_s;    /* likewise, where a multigrid is worth its while */
     int64_t cases;     /* loads on the body */

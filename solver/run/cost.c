@@ -4,6 +4,7 @@
 
 #include "amg/amg.h"
 #include "linalg/blas.h"
+#include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "scene/breadth.h"
@@ -232,6 +233,31 @@ static double find_firmness(const uz_scene *scene, const uz_mesh *mesh, const uz
     return tetrahedra ? sqrt(most) : most;
 }
 
+/* Tetrahedra that lie as in no grid: there half of the nodes and more, of thin bodies a third, have as many around
+ * them, of what mesh generators make an eighth. Where that can't be counted it is not known. */
+static bool is_irregular(const uz_mesh *mesh)
+{
+    enum { MOST = 63, CORNERS = 4 };
+    int64_t with[MOST + 1] = {0}, nodes = 0, largest = 0;
+    uint8_t *around = NULL;
+    if (mesh->n_elements == 0 || uz_element_type_of((uz_element_kind)mesh->kind[0])->corners != CORNERS ||
+        !(around = uz_alloc_zero(mesh->n_nodes, sizeof *around)))
+        return false;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int k = 0; k < CORNERS; k++) {
+            uint8_t *own = &around[mesh->node[mesh->first[e] + k]];
+            *own = (uint8_t)(*own + (*own < MOST));
+        }
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        with[around[i]]++;
+    for (int k = 1; k <= MOST; k++) {
+        nodes += with[k];
+        largest = with[k] > largest ? with[k] : largest;
+    }
+    free(around);
+    return 4 * largest < nodes;
+}
+
 uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_model *model, const uz_scene *scene,
                              int64_t n_b, int64_t cases, const uz_settings *settings)
 {
@@ -252,6 +278,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
                           .slender = solid ? find_slender(&model->mesh, brick) : 1.0,
                           .firmness = solid ? find_firmness(scene, &model->mesh, brick) : 1.0,
+                          .irregular = solid && !brick && is_irregular(&model->mesh),
                           .entry_s = brick ? 0.0 : rate_of(K),
                           .cycle_s = brick || is_large(K) ? cycle_rate(brick != NULL) : 0.0,
                           .cases = cases};

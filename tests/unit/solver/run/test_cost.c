@@ -199,7 +199,8 @@ TEST(what_is_harder_costs_more)
         plain.by_cells = cells ? 2e7 : 0.0;
         plain.stretch = 1.8;
         plain.firmness = 1.0;
-        uz_cost_size larger = plain, firmer = plain, longer = plain, slender = plain, more = plain, easier = plain;
+        uz_cost_size larger = plain, firmer = plain, longer = plain, slender = plain, more = plain, easier = plain,
+                     rougher = plain;
         larger.d *= 2;
         larger.k_entries *= 2;
         firmer.firmness = 14.6; /* 0.49 */
@@ -207,6 +208,7 @@ TEST(what_is_harder_costs_more)
         slender.slender = 10.0;
         more.cases = 10;
         easier.firmness = 0.6;
+        rougher.irregular = true;
         const double base = seconds_without_factor(plain);
         CHECK(seconds_without_factor(larger) > 2.0 * base && seconds_without_factor(larger) < 2.5 * base);
         CHECK(seconds_without_factor(firmer) > 1.5 * base && seconds_without_factor(firmer) < 5.0 * base);
@@ -214,6 +216,7 @@ TEST(what_is_harder_costs_more)
         CHECK(seconds_without_factor(slender) > 1.1 * base && seconds_without_factor(slender) < 3.0 * base);
         CHECK(seconds_without_factor(more) > 2.0 * base && seconds_without_factor(more) < 10.0 * base);
         CHECK_REL(seconds_without_factor(easier), base, 1e-12);
+        CHECK_REL(seconds_without_factor(rougher), cells ? base : 2.15 * base, cells ? 1e-12 : 0.16);
     }
 }
 
@@ -289,6 +292,38 @@ TEST(a_scene_tells_how_hard_it_is)
     CHECK_MSG(seconds[1] > 1.5 * seconds[0] && seconds[3] > 1.5 * seconds[0], "%g, %g, %g s", seconds[0], seconds[1],
               seconds[3]);
     CHECK(seconds[2] < seconds[0]); /* fewer entries */
+}
+
+/* Tetrahedra of a grid, of a thin one too, and the same number of them between nodes that were drawn; other elements.
+ */
+TEST(tetrahedra_of_no_grid_are_irregular)
+{
+    static const struct {
+        const char *element;
+        int64_t deep;
+        bool drawn;
+    } bodies[] = {{"tet4", 8, false}, {"tet10", 8, false}, {"tet4", 3, false},
+                  {"tet4", 8, true},  {"tet10", 8, true},  {"hex8", 8, true}};
+    for (size_t k = 0; k < sizeof bodies / sizeof bodies[0]; k++) {
+        uz_box box = {.size = {8, 8, (double)bodies[k].deep}, .cells = {8, 8, bodies[k].deep}, .dim = 3};
+        uz_body_model model = {.brick = NULL};
+        int64_t none[] = {0, 0};
+        const uz_csc empty = {.rows = 1, .cols = 1, .ptr = none};
+        const uz_scene scene = {.model = UZ_SOLID};
+        const uz_settings settings = uz_settings_default();
+        uz_error err = {0};
+        uint64_t seed = k;
+        snprintf(box.element, sizeof box.element, "%s", bodies[k].element);
+        CHECK_MSG(uz_mesh_from_box(&model.mesh, &box, &err) == UZ_OK, "%s", err.message);
+        for (int64_t i = 0; bodies[k].drawn && i < model.mesh.first[model.mesh.n_elements]; i++) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            model.mesh.node[i] = (int64_t)(seed >> 33) % 729; /* corners of 8 x 8 x 8 cells */
+        }
+        const uz_cost_size size = uz_cost_size_of(&empty, &empty, &model, &scene, 0, 1, &settings);
+        CHECK_MSG(size.irregular == (bodies[k].drawn && bodies[k].element[0] == 't'), "%s %lld deep%s",
+                  bodies[k].element, (long long)bodies[k].deep, bodies[k].drawn ? ", drawn" : "");
+        uz_mesh_clear(&model.mesh);
+    }
 }
 
 /* An order that was made to know the price has been paid for, whatever is chosen. */
