@@ -24,6 +24,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Bodies touch where their gap is less than this part of the places that it is the difference of: what rounding leaves
+ * would press one on the other, or keep them apart. */
+#define ROUNDED (2 * DBL_EPSILON)
+
 /* What dof c of carrier k has in n . u (uz_followers). */
 static double carried_share(const double *share, int64_t k, int c, const double n[3], int dim)
 {
@@ -465,7 +469,9 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
             uz_contact_row at;
             if (!uz_contact_row_at(&at, &in, i))
                 continue;
-            const double gap = gap_at(&scale, model, &at, prescribed);
+            double gap = gap_at(&scale, model, &at, prescribed);
+            if (at.masters > 0 && fabs(gap) <= ROUNDED * scale)
+                gap = 0;
             if (!moves_something(model, &at))
                 status =
                     model->turned && uz_is_rigid(model, at.node) ? UZ_OK : check_held(model, &at, k, gap, scale, err);

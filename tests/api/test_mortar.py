@@ -435,6 +435,17 @@ def test_bodies_that_come_to_touch_press_with_nothing(s):
           far["contact"]["force"], near["contact"]["force"])
 
 
+def test_bodies_that_touch_at_rest_have_no_error(s):
+    """Nothing acts: gaps that are rounding of places, here of thirds and off the origin, press with nothing at all."""
+    for kind, kinematics, off in itertools.product(("quad4", "tri3", "quad8"), ("auto", "fixed", "moving"), (0, 37.3)):
+        request = body([kind, kind], [(3, 3), (5, 2)], [lambda x, y: (x, off + 0.7 * y), lambda x, y: (0.1 + 0.8 * x, off + 0.7 + 0.6 * y)],
+                       {"low": [(0, "top")], "high": [(1, "bottom")], "foot": [(0, "bottom")], "lid": [(1, "top")]},
+                       model="plane_strain", materials=[{"on": "all", "young": 1000, "poisson": 0.3}], kinematics=kinematics,
+                       supports=[{"on": on, "ux": 0, "uy": 0} for on in ("foot", "lid")], contacts=[{"on": "high", "with": "low"}])
+        summary = s.solved(request, "converged")["summary"]
+        check(summary["contact"]["force"] == [0, 0] and summary["error"]["total"] == 0 and summary["warnings"] == [], summary)
+
+
 def test_what_is_pressed_beside_a_body_that_is_carried(s):
     """Blocks that touch are pressed by 2^-50 of the way on which others come to touch: it is their whole way, and their force
     is no rounding of it."""
