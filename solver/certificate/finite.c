@@ -653,10 +653,18 @@ static void look_for_pressed_apart(uz_finite_certificate *out, const uz_finite_a
                                    int64_t contact, double pressed)
 {
     const uz_body_model *model = of->model;
-    for (int64_t i = 0; i < model->m; i++)
-        if (model->info.contact_of[i] == contact && !uz_row_inner(model, i) && of->r[i] < -pressed &&
-            isfinite(apart[model->info.contact_node[i]]))
-            out->pressed_apart = fmax(out->pressed_apart, apart[model->info.contact_node[i]]);
+    double nearest = INFINITY;
+    for (int64_t i = 0; i < model->m; i++) {
+        if (model->info.contact_of[i] != contact || !(of->r[i] < -pressed))
+            continue;
+        const double here = apart[model->info.contact_node[i]];
+        const bool shares = model->row_ends && model->row_ends[2 * i] >= 0;
+        nearest = fmin(nearest, shares && isfinite(here) ? here : 0);
+        if (!uz_row_inner(model, i) && isfinite(here))
+            out->pressed_apart = fmax(out->pressed_apart, here);
+    }
+    if (isfinite(nearest))
+        out->touches_nowhere = fmax(out->touches_nowhere, nearest);
 }
 
 /* Nodes that have rows, from the obstacles themselves: what g says of them is checked by what it should be. A middle's

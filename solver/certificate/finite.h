@@ -42,9 +42,10 @@ typedef struct {
     double least_part;     /* the same over the length of the side there */
     double pressed_apart;  /* the farthest that the sides around a node with a pressed row are from the obstacle, over
                             * their length; 0: none is apart */
-    double least_at_rows;  /* of g */
-    double least_at_nodes; /* of the obstacles, which have no overlap left, from the nodes that have rows */
-    bool swallows;         /* an obstacle is inside of the body (swallowed.h) */
+    double touches_nowhere; /* the same of the nearest in a contact of which all are apart, of these the farthest */
+    double least_at_rows;   /* of g */
+    double least_at_nodes;  /* of the obstacles, which have no overlap left, from the nodes that have rows */
+    bool swallows;          /* an obstacle is inside of the body (swallowed.h) */
 } uz_finite_certificate;
 
 /* stop (NULL: never) is asked between elements, blocks of the factor and places beside this one. Errors: UZ_ERR_MEMORY,

@@ -30,6 +30,13 @@ typedef struct {
 uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *model, const uz_scene *scene,
                                  const double *u, const double *r, uz_error *err);
 
+/* How far from its obstacle the body is where a contact with it presses and touches nowhere, else 0: rows of middles
+ * have a share of their ends' gaps off them (contact_rows.c), and where sides are long against the obstacle's radius
+ * one may press from afar. *row: the nearest that does, of the farthest such contact. r, g: m; overlap: n_contacts. */
+double uz_pressed_apart(int64_t *row, const uz_body_model *model, const uz_overlap *overlap, int64_t n_contacts,
+                        const double *r, const double *g);
+#define UZ_WARN_APART "pressed_apart"
+
 /* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
  * summary's geometry.sliding and discretization_error. coarse: of the answer. */
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene,

@@ -26,6 +26,9 @@
 /* An obstacle stands in a side where it is deeper than this part of it. */
 #define STANDS_IN 0.01
 
+/* In parts of the body's extent. */
+#define TOUCHES 1e-9
+
 /* By node and by side of the contact at hand. */
 typedef struct {
     const uz_body_model *model;
@@ -288,4 +291,40 @@ uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *mo
     return room ? UZ_OK
                 : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of %lld contacts",
                           (long long)scene->n_contacts);
+}
+
+/* ---- presses and touches nowhere */
+
+/* Of the node itself: the row of a middle has a share of its ends' off it. */
+static double own_gap(const uz_body_model *model, const double *g, int64_t row)
+{
+    const int64_t *ends = model->row_ends;
+    if (!ends || ends[2 * row] < 0)
+        return g[row];
+    return (1 - 2 * UZ_MIDDLE_SHARE) * g[row] +
+           UZ_MIDDLE_SHARE * (own_gap(model, g, ends[2 * row]) + own_gap(model, g, ends[2 * row + 1]));
+}
+
+double uz_pressed_apart(int64_t *row, const uz_body_model *model, const uz_overlap *overlap, int64_t n_contacts,
+                        const double *r, const double *g)
+{
+    double most = 0;
+    int64_t i = 0;
+    for (int64_t k = 0; k < n_contacts; k++) {
+        double nearest = INFINITY;
+        int64_t at = -1;
+        for (; i < model->m && model->info.contact_of[i] == k; i++) {
+            const double gap = own_gap(model, g, i);
+            if (model->law->kind->active(model->law, NULL, &r[i], 1) == 0 || gap >= nearest)
+                continue;
+            nearest = gap;
+            at = i;
+        }
+        const bool touches = overlap[k].depth > 0 || !(nearest > TOUCHES * model->mesh.extent);
+        if (at < 0 || touches || model->sites[k].ends || !(nearest > most))
+            continue;
+        most = nearest;
+        *row = at;
+    }
+    return most;
 }

@@ -655,6 +655,19 @@ static void look_at_peak(const doubts *d, const double *pressure)
              (long long)d->out->peak_node, 100 * stands_out, stiff ? ", or use incompatible_modes" : "");
 }
 
+static void look_at_apart(const doubts *d, const double *g)
+{
+    int64_t row = -1;
+    const double apart = uz_pressed_apart(&row, d->model, d->out->overlap, d->scene->n_contacts, d->r, g);
+    if (row < 0)
+        return;
+    const double side = sqrt(d->model->info.contact_area[row]);
+    warn(d->out, UZ_WARN_APART, apart / side,
+         "contact %lld touches nowhere and presses from %.2g away, as sides are long against the obstacle's radius: "
+         "use a finer mesh there",
+         (long long)d->model->info.contact_of[row], apart);
+}
+
 /* ---- mesh */
 
 /* All forces of the stabilizer's springs are at most its stiffness times the largest displacement, as the shares of
@@ -808,5 +821,6 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         look_at_overlap(&d, k);
     }
     look_at_peak(&d, result->pressure);
+    look_at_apart(&d, result->g);
     return status;
 }

@@ -20,6 +20,8 @@
 /* An obstacle that stands deeper in a side between rows than this part of its length, or presses it from farther away:
  * rows leave 0.01 at most. */
 #define CUTS_IN 0.03
+/* And one that no side of the contact comes so near to. */
+#define TOUCHES 1e-6
 /* Forces that are less than this part of those by which the strain energy comes from the largest displacement are what
  * equations leave, as of warmth, which holds itself. */
 #define LEAST_OF_ENERGY 1e-6
@@ -100,13 +102,18 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
     }
 }
 
+static bool is_pressed_apart(const uz_finite_certificate *c)
+{
+    return c->pressed_apart > CUTS_IN || c->touches_nowhere > TOUCHES;
+}
+
 static uz_outcome outcome_of(const uz_finite_run *run, uz_part why)
 {
     const uz_finite_certificate *c = &run->certificate;
     if (run->found.load >= 1)
-        return c->least_part < -CUTS_IN || c->pressed_apart > CUTS_IN ? UZ_MESH_LIMIT
-               : !(c->residual <= run->requested)                     ? UZ_PRECISION_LIMIT
-                                                                      : UZ_CONVERGED;
+        return c->least_part < -CUTS_IN || is_pressed_apart(c) ? UZ_MESH_LIMIT
+               : !(c->residual <= run->requested)              ? UZ_PRECISION_LIMIT
+                                                               : UZ_CONVERGED;
     return why == UZ_PART_INVERTED    ? UZ_INVERTED
            : why == UZ_PART_SWALLOWED ? UZ_MESH_LIMIT
            : why == UZ_PART_STOPPED   ? run->stopped

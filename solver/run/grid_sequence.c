@@ -332,10 +332,10 @@ static bool is_answered(const uz_summary *s)
     return !uz_has_no_answer(s) && s->outcome != UZ_UNSTABLE;
 }
 
-/* Of large deformation: is the answer under a part of the load, or an obstacle in it that a finer grid may keep out? */
+/* Is the answer under a part of the load, or an obstacle in it that a finer grid may keep out, or pressed from afar? */
 static bool wants_finer(const uz_summary *s)
 {
-    return is_large(s) && (s->finite.load < 1 || s->outcome == UZ_MESH_LIMIT);
+    return uz_is_pressed_apart(s) || (is_large(s) && (s->finite.load < 1 || s->outcome == UZ_MESH_LIMIT));
 }
 
 static double error_of(const search *g, const uz_summary *s)

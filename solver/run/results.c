@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "post/balance.h"
 #include "post/evaluate.h"
 
 #include <math.h>
@@ -95,6 +96,26 @@ void uz_pass_unheld(uz_status *status, int64_t *unheld, uz_error *first, const u
     } else if (err) {
         *err = *first;
     }
+}
+
+bool uz_is_pressed_apart(const uz_summary *s)
+{
+    bool so = false;
+    for (int i = 0; s->evaluation && i < s->evaluation->n_warnings; i++)
+        so = so || strcmp(s->evaluation->warnings[i].code, UZ_WARN_APART) == 0;
+    return so;
+}
+
+void uz_judge_contact(uz_result *result)
+{
+    uz_summary *s = &result->summary;
+    if (s->outcome != UZ_CONVERGED || !uz_is_pressed_apart(s))
+        return;
+    s->outcome = UZ_MESH_LIMIT;
+    snprintf(s->message, sizeof s->message,
+             "A contact presses where the body does not touch the obstacle (%s). Use a finer mesh along it, or "
+             "\"refine\": \"auto\" in it",
+             UZ_WARN_APART);
 }
 
 void uz_judge_quantity(uz_result *result)

@@ -21,6 +21,10 @@ void uz_blank_answer(uz_result *result);
  * them are, which is refused as the first one was. unheld, first: how many there were before, and why; 0 at first. */
 void uz_pass_unheld(uz_status *status, int64_t *unheld, uz_error *first, const uz_result *result, int64_t n,
                     uz_error *err);
+/* Does a contact press that touches nowhere (UZ_WARN_APART)? */
+bool uz_is_pressed_apart(const uz_summary *s);
+/* An answer that converged, but has such a contact, ends as UZ_MESH_LIMIT. */
+void uz_judge_contact(uz_result *result);
 /* An answer that converged, but on a mesh that leaves the first quantity a wider interval than was asked for, ends as
  * UZ_MESH_LIMIT. */
 void uz_judge_quantity(uz_result *result);

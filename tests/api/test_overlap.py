@@ -121,6 +121,26 @@ def test_both_sides_are_looked_at(s):
     check(contact["approach"] == 0 and contact["active"] == 0, contact)
 
 
+def test_what_touches_nowhere_is_not_converged(s):
+    """A ball of six sides beside a face of hex20, or of twenty: middles with a share of their ends' gaps are pressed by it. A finer
+    mesh tells that nothing is, and where the face is moved into the ball it touches: then the outcome is none of this."""
+    def beside(radius, gap, push, refine):
+        mesh = {"box": {"size": [4, 4, 1], "cells": [4, 4, 1], "element": "hex20"}, **({"refine": "auto"} if refine else {})}
+        request = {"problem": {"kind": "scene", "model": "solid", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": 0.3}],
+                               "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": push}],
+                               "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [2, 2.5, 1 + gap + radius], "radius": radius}}}]}}
+        return summary_of(s, {**request, **({"solver": {"accuracy": {"relative_error": 0.2}}} if refine else {})})
+
+    for radius, gap, push in ((6, 0.004, 0), (6, 0.05, 0.046), (20, 0.001, 0)):
+        summary = beside(radius, gap, push, False)
+        check(summary["outcome"] == "mesh_limit" and 0 < warned(summary)["pressed_apart"] < 0.05, summary["outcome"], summary["warnings"])
+        if radius == 6:
+            finer = beside(radius, gap, push, True)
+            check(finer["outcome"] == "converged" and finer["contact"]["force"] == [0, 0, 0] and len(finer["mesh"]["ladder"]) > 1, finer)
+    touching = beside(6, 0.05, 0.1, False)
+    check(touching["outcome"] == "converged" and "pressed_apart" not in warned(touching) and touching["contact"]["active"] > 1, touching)
+
+
 def test_two_contacts_are_measured_each(s):
     request = copy.deepcopy(scene("slide_over_bump"))
     request["problem"]["contacts"] += [{"on": "left", "obstacle": {"plane": {"point": [-100, 0], "normal": [1, 0]}}}]

@@ -59,8 +59,12 @@ TEST(an_evaluation_by_threads_is_that_of_one)
     CHECK(answer->m >= 1000);
     CHECK_INT(uz_aside_begin(THREADS), THREADS);
     for (int k = 0; k < THREADS; k++) {
-        of[k] = (uz_result){
-            .m = answer->m, .n_nodes = answer->n_nodes, .u = answer->u, .r = answer->r, .mesh = answer->mesh};
+        of[k] = (uz_result){.m = answer->m,
+                            .n_nodes = answer->n_nodes,
+                            .u = answer->u,
+                            .r = answer->r,
+                            .g = answer->g,
+                            .mesh = answer->mesh};
         uz_aside_allow(k + 1);
         CHECK_INT(uz_evaluate(&of[k], &model, &s, NULL, &err), UZ_OK);
         const uz_evaluation *one = of[0].evaluation, *e = of[k].evaluation;

@@ -100,8 +100,12 @@ static long fail_each(attempt run, const uz_scene *scene, const uz_field_source 
 static bool evaluate_at(const uz_scene *scene, const uz_body_model *model, const uz_result *answer, long n)
 {
     uz_error err = {0};
-    uz_result again = {
-        .m = answer->m, .n_nodes = answer->n_nodes, .u = answer->u, .r = answer->r, .mesh = answer->mesh};
+    uz_result again = {.m = answer->m,
+                       .n_nodes = answer->n_nodes,
+                       .u = answer->u,
+                       .r = answer->r,
+                       .g = answer->g,
+                       .mesh = answer->mesh};
     heap_watch(n);
     const uz_status status = uz_evaluate(&again, model, scene, NULL, &err);
     free(again.pressure);
