@@ -663,8 +663,8 @@ static uz_status try_grid(search *g, grid on, uz_error *err)
             else if (is_answered(s) && !(left_of(s) < g->requested) && g->stop == STOP_NOT)
                 g->stop = STOP_ALGEBRA;
             const seen *all = &g->seen[i * UZ_GRID_LEVELS], *now = &all[g->sequence.count - 1];
-            if (g->stop == STOP_NOT && is_large(s) && s->finite.load < 1 && g->best.results &&
-                s->finite.load < g->best.results[i]->summary.finite.load + MORE_LOAD) {
+            if (g->stop == STOP_NOT && is_large(s) && s->finite.load < 1 && s->outcome != UZ_MESH_LIMIT &&
+                g->best.results && s->finite.load < g->best.results[i]->summary.finite.load + MORE_LOAD) {
                 g->stop = STOP_GRID;
                 snprintf(g->reason, sizeof g->reason, "the next grid bears %.3g of the load alone: %.20s",
                          s->finite.load, uz_choice_name(UZ_CHOICE_OUTCOME, s->outcome));

@@ -3,6 +3,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "finite/mesh_error.h"
+#include "core/vector3.h"
+#include "obstacle/obstacle.h"
 #include "run/results.h"
 #include "scene/bisect.h"
 #include "scene/subdivide.h"
@@ -72,6 +74,63 @@ static void add_contact(double *eta2, double *room, const uz_body_model *body, c
     }
 }
 
+/* Is an obstacle nearer to a side, displaced by u, than that is long? */
+static uz_status look_near(bool *near, const uz_obstacle *obstacle, const uz_body_model *body, uz_face face,
+                           const double *u, uz_error *err)
+{
+    uz_side side;
+    double xyz[3 * UZ_FACE_NODES], length = 0, least = INFINITY;
+    int64_t node[UZ_FACE_NODES];
+    uz_status status = UZ_OK;
+    uz_body_side(&side, xyz, node, body, face);
+    for (int a = 0; a < side.nodes && status == UZ_OK; a++) {
+        uz_gap gap;
+        double x[3] = {0};
+        for (int c = 0; c < side.dim; c++)
+            x[c] = xyz[side.dim * a + c] + u[side.dim * node[a] + c];
+        for (int b = 0; b < a; b++)
+            length = fmax(length, sqrt(uz_distance2(xyz + side.dim * a, xyz + side.dim * b, side.dim)));
+        status = uz_obstacle_gap(&gap, obstacle, x, err);
+        least = fmin(least, status == UZ_OK ? gap.gap : INFINITY);
+        if (status == UZ_ERR_SCENE) { /* in its very middle */
+            uz_error_reset(err);
+            status = UZ_OK;
+            least = 0;
+        }
+    }
+    *near = least < length;
+    return status;
+}
+
+/* An obstacle stands in the body, or its sides have gone past it: it is smaller than they are, and what strains say of
+ * the mesh has no part in it. The elements of sides that are near get a share beyond all others. */
+static uz_status add_obstacles(indicator *all, bool *any, const uz_body_model *body, const uz_problem *problem,
+                               int64_t of_case, const uz_result *result, uz_error *err)
+{
+    const uz_scene scene = uz_scene_of_case(problem, of_case);
+    const uz_summary *s = &result->summary;
+    const bool stands_in = s->geometry.kind == UZ_KINEMATICS_FINITE && s->outcome == UZ_MESH_LIMIT && result->u;
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; stands_in && k < scene.n_contacts && status == UZ_OK; k++) {
+        const uz_contact *contact = &scene.contacts[k];
+        const uz_group *group = uz_mesh_group(&body->mesh, contact->on, "/contacts", NULL);
+        uz_obstacle *obstacle = NULL;
+        if (contact->kind == UZ_OBSTACLE_BODY || contact->kind == UZ_OBSTACLE_PLANE || !group)
+            continue;
+        status = uz_obstacle_new(&obstacle, contact, k, scene.model, err);
+        for (int64_t f = 0; f < group->n_faces && status == UZ_OK; f++) {
+            bool near;
+            status = look_near(&near, obstacle, body, group->face[f], result->u, err);
+            if (status != UZ_OK || !near)
+                continue;
+            all[group->face[f].element].share = INFINITY;
+            *any = true;
+        }
+        uz_obstacle_free(obstacle);
+    }
+    return status;
+}
+
 /* Of cases beside others: the square of the error that is asked for, which of a quantity is of second order already. */
 static double weight_of(const uz_result *result)
 {
@@ -120,19 +179,24 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
         for (int64_t e = 0; e < n_elements; e++)
             all[e].share = fmax(all[e].share, eta2[e] * error * error / seen);
     }
+    bool stands_in = false;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < n_cases && done && status == UZ_OK; i++)
+        status = add_obstacles(all, &stands_in, body, problem, i, results[i], err);
     for (int64_t e = 0; e < n_elements && done; e++)
-        sum += all[e].share;
+        sum += isfinite(all[e].share) ? all[e].share : 0;
     if (done)
         qsort(all, (size_t)n_elements, sizeof *all, by_share);
-    const bool every = left >= 1;
+    const bool every = left >= 1 && !stands_in;
     const bool once = !every && body->mesh.dim == 2 && !subdivided && (squared ? sqrt(left) : left) > NEAR;
     /* what is bisected once along each direction keeps 4^-order of the square of its error, of triangles that are
      * halved 2^-order; what else is in intervals by estimate, of the ends of contacts, falls faster */
     const double kept = squared ? (proved ? AIM : 1) * left : AIM * AIM * left * left,
                  needed = (1 - kept) / (1 - pow(once ? 2 : 4, -order)), bulk = fmin(BULK, fmax(LEAST, needed)) * sum;
-    while (done && count < n_elements && (every || (part < bulk && all[count].share > 0)))
+    while (done && count < n_elements &&
+           (every || (stands_in ? isinf(all[count].share) : part < bulk && all[count].share > 0)))
         part += all[count++].share;
-    int64_t *grown = done && count > 0 ? uz_realloc(*list, *n + 3 + count, sizeof *grown) : NULL;
+    int64_t *grown = done && status == UZ_OK && count > 0 ? uz_realloc(*list, *n + 3 + count, sizeof *grown) : NULL;
     if (grown) {
         *list = grown;
         if (*n == 0 && subdivided)
@@ -145,6 +209,7 @@ uz_status uz_mark_elements(int64_t **list, int64_t *n, const uz_body_model *body
     }
     done = done && (grown || count == 0);
     uz_free_all(all, eta2, room);
-    return done ? UZ_OK
-                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to choose among %lld elements", (long long)n_elements);
+    return status != UZ_OK ? status
+           : done          ? UZ_OK
+                  : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to choose among %lld elements", (long long)n_elements);
 }

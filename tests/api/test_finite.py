@@ -478,6 +478,18 @@ def test_a_mesh_is_refined(s):
     check(true < 0.1, true, coarser["error"])
 
 
+def test_a_mesh_is_refined_where_an_obstacle_is_in_it(s):
+    """Its sides go past a roller that is smaller than they are: the estimate of strains says nothing of that."""
+    for radius, push, cells, coarse in ((0.2, 0.4, 2, 2), (0.1, 0.3, 1, 2)):
+        found = answer(s, {**block(mesh={"box": {"size": [4, 1], "cells": [cells, 1], "element": "quad8"}, "refine": "auto"},
+                                   supports=[{"on": "top", "ux": 0, "uy": -push}],
+                                   contacts=[{"on": "bottom", "obstacle": {"circle": {"center": [2.3, -0.2 - radius], "radius": radius}}}]),
+                           "solver": {"accuracy": {"relative_error": 0.5}}}, "summary")[1]["summary"]
+        ladder = found["mesh"]["ladder"]
+        check(found["outcome"] == "converged" and found["finite"]["load"] == 1 and found["error"]["total"] <= 0.5, found["message"])
+        check(len(ladder) >= coarse + 1 and ladder[0]["error"] >= 1 and found["contact"]["force"][1] > 0.03, ladder)
+
+
 def test_levels_of_accuracy_on_a_mesh_that_is_given(s):
     """Balanced asks for a tenth of the mesh's error, and a whole error that the mesh does not have ends as mesh_limit."""
     roller = {"mesh": {"box": {"size": [4, 1], "cells": [16, 4]}}, "supports": [{"on": "top", "ux": 0.5, "uy": -0.2}],
