@@ -201,7 +201,7 @@ typedef struct {
     bool compared;
     double error;   /* of small deformation: relative, of the displacements, of the resultants or of the root of the
                      * strain energy, whichever is most; INFINITY: large deformation has no answer under the whole load */
-    const char *in; /* which of them: "displacements", "forces" or "energy" */
+    const char *in; /* which of them: "displacements", "forces", "energy"; where asked for "stress", "quantities" */
     double load;    /* the part of it that it has a stable equilibrium under */
 } uz_small;
 

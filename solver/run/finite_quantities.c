@@ -165,6 +165,7 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
     const uz_stop stop = {&run->hooks, run->deadline};
     tangent x = {.run = run};
     uz_body_model displaced = {.mesh.xyz = NULL};
+    const bool compared = run->scene.compared;
     const bool cut = answer->summary.outcome == UZ_MESH_LIMIT; /* or that is the answer under a part */
     bool known = false;
     if (run->problem->n_quantities == 0)
@@ -181,11 +182,12 @@ uz_status uz_finite_quantities(uz_result *answer, uz_finite_run *run, uz_error *
     if (status == UZ_OK)
         status = uz_displaced(&displaced, &at->rows, at->u, err);
     displaced.place = NULL;
-    if (status == UZ_OK && whole)
+    if (status == UZ_OK && whole && !compared)
         status = prepare(&known, &x, err);
     const uz_quantity_large place = {.of = &x,
                                      .place = {&displaced, at->loads},
-                                     .why = !whole   ? "this is the answer under a part of the load"
+                                     .why = compared ? "its value is compared"
+                                            : !whole ? "this is the answer under a part of the load"
                                             : cut    ? "an obstacle, or another body, stands in it between rows"
                                             : !known ? "its tangent has no factor"
                                                      : NULL,

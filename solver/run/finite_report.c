@@ -362,6 +362,24 @@ static void take_greater(uz_small *out, double error, const char *in)
     }
 }
 
+/* What is asked for: of a force or a displacement in parts of such a part of the largest at least. most: of forces. */
+static void compare_asked(uz_small *out, const uz_result *large, const uz_evaluation *small, double most)
+{
+    const uz_evaluation *here = large->evaluation;
+    if (here->stressed && small->stressed && here->von_mises.value > 0)
+        take_greater(out, fabs(small->von_mises.value / here->von_mises.value - 1), "stress");
+    for (int64_t i = 0; i < here->n_quantities && i < small->n_quantities; i++) {
+        const uz_quantity_found *one = &here->quantities[i];
+        const double least = one->kind == UZ_QUANTITY_DISPLACEMENT    ? large->summary.finite.displacement
+                             : one->kind == UZ_QUANTITY_CONTACT_FORCE ? most
+                             : one->kind == UZ_QUANTITY_REACTION      ? most
+                                                                      : 0,
+                     size = fmax(fabs(one->found), UZ_LEAST_FORCE * least);
+        if (size > 0)
+            take_greater(out, fabs(one->found - small->quantities[i].found) / size, "quantities");
+    }
+}
+
 uz_status uz_finite_compare(uz_small *out, const uz_finite_run *run, const uz_result *result, const uz_result *small,
                             uz_error *err)
 {
@@ -383,6 +401,7 @@ uz_status uz_finite_compare(uz_small *out, const uz_finite_run *run, const uz_re
     if (most > 0)
         take_greater(out, off / most, "forces");
     take_greater(out, fabs(sqrt((there->strain_energy + there->kept_energy) / energy) - 1), "energy");
+    compare_asked(out, result, there, most);
     uz_doubt_strain(small->evaluation, out, &run->base, &run->scene, small->u, run->at.u);
     return UZ_OK;
 }

@@ -110,7 +110,6 @@ static uz_status compare_linear(uz_result *result, const uz_problem *one, const 
     uz_error own = {0};
     by_law.scene.kinematics = UZ_KINEMATICS_FINITE;
     by_law.scene.compared = true;
-    by_law.n_quantities = 0; /* they are the small answer's */
     by_law.scene.materials = uz_alloc(one->scene.n_materials, sizeof *by_law.scene.materials);
     if (!by_law.scene.materials)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)one->scene.n_materials);
@@ -237,7 +236,7 @@ static uz_status weigh_chosen(bool *compared, uz_result *result, const uz_proble
     one.scene.box.automatic = false;
     one.scene.bisected = result->grids->bisected;
     one.scene.n_bisected = result->grids->n_bisected;
-    one.n_quantities = 0;
+    one.scene.compared = true;
     coarse.relative_error = COMPARED_TO;
     const uz_status status = solve_large(&large, result, &one, &coarse, hooks, deadline, err);
     *compared = large != NULL;

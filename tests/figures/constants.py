@@ -85,7 +85,7 @@ PHRASES = {
     "in ordinary precision, with 1e-14 of what they add up": constant(1e-14, r"#define UZ_SUM_ROUNDING +([\d.e-]+)"),
     "off the middles of their sides by up to 1e-5 of these": constant(1e-5, r"#define NEARLY +([\d.e-]+)"),
     "end without a certified equilibrium in 20 steps": constant(20, r"MOST_QPS = (\d+)"),
-    "large deformation where that is more than 5 %;": None, "(`small_deformation`), beyond 0.05.": None, "`small_deformation` is beyond 0.05.": None, "Where that is more than 5 %": None,  # UZ_MOST_SLIDING
+    "large deformation where that is more than 5 %;": None, "(`small_deformation`), beyond 0.05.": None, "of strains from 0.02 on": constant(0.02, r"#define LEAST_STRAINED ([\d.]+)"), "Where that is more than 5 %": None,  # UZ_MOST_SLIDING
     "by up to 20,000 dofs.": constant(20000, r"UZ_MOST_COMPARED = (\d+)"), "Up to 0.02 the answer stays:": constant(0.02, r"#define UZ_SURELY_SMALL ([\d.]+)"),
     "So where that is more than 2 % of the edge before": constant(0.02, r"#define EARLY +([\d.]+)"), "from about R < 4.2 edges on": None,  # 1 / (12 EARLY)
     "solids of up to 20,000 dofs, in all": constant(20000, r"UZ_MOST_FINITE_DOFS (\d+)"), "for which solids have at most 20,000 dofs.": constant(20000, r"UZ_MOST_FINITE_DOFS (\d+)"),
