@@ -75,8 +75,7 @@ static uz_status examine_elements(examination *x, uz_bound_check_result *out, co
 
 static void clear_elements(examination *x)
 {
-    free(x->resultant);
-    free(x->gap);
+    uz_free_all(x->resultant, x->gap);
 }
 
 static double *copy_of(const double *from, int64_t n)

@@ -166,8 +166,7 @@ uz_status uz_press_masters(examination *x, const double *u, const int64_t *dof, 
     double *acting = uz_alloc_zero(body->n_edges * x->moments, sizeof *acting);
     double *left = uz_alloc_zero(2 * body->n_edges, sizeof *left), *covered = left ? left + body->n_edges : NULL;
     if (!acting || !left) {
-        free(acting);
-        free(left);
+        uz_free_all(acting, left);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what presses on %lld edges", (long long)body->n_edges);
     }
     for (int64_t k = 0; k < body->n_segments; k++)
@@ -182,8 +181,7 @@ uz_status uz_press_masters(examination *x, const double *u, const int64_t *dof, 
     for (int64_t i = 0; i < body->n_edges; i++)
         if (body->edge[i].facing == UZ_BOUND_MASTER)
             uz_count_turning(x, &body->edge[i], left[i] + (covered[i] < 1 - 1e-10 ? uncovered(x, acting, i) : 0));
-    free(acting);
-    free(left);
+    uz_free_all(acting, left);
     return UZ_OK;
 }
 

@@ -80,8 +80,7 @@ uz_status uz_bound_body_make(uz_bound_body *out, const uz_body_model *model, con
         if (status == UZ_OK)
             status = uz_bound_loose_motions(out, err);
     }
-    free(x.marked);
-    free(x.found);
+    uz_free_all(x.marked, x.found);
     if (status != UZ_OK)
         uz_bound_body_clear(out);
     return status;

@@ -274,8 +274,7 @@ static uz_status assemble(uz_csc *K, double *p, const int64_t *first, const uz_b
         if (K)
             add_stiffness(K, first, m, own, dof_of);
     }
-    free(kept);
-    free(order);
+    uz_free_all(kept, order);
     return status;
 }
 
@@ -537,8 +536,7 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
     macro *kept = uz_alloc_zero(MADE + 1, sizeof *kept), *m = NULL;
     int64_t *order = order_of(body);
     if (!kept || !order) {
-        free(kept);
-        free(order);
+        uz_free_all(kept, order);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
     }
     memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
@@ -576,8 +574,7 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
         for (int i = 0; i < values; i++)
             to[place_of_value(i, m->degree)] = sum[i];
     }
-    free(kept);
-    free(order);
+    uz_free_all(kept, order);
     return status;
 }
 

@@ -184,8 +184,7 @@ uz_status uz_bound_take_pair(uz_bound_body *body, const uz_scene *scene, int64_t
     if (segment && body->n_segments > 0)
         memcpy(segment, body->segment, (size_t)body->n_segments * sizeof *segment);
     if (!segment || !s[0].edges) {
-        free(segment);
-        free(s[0].edges);
+        uz_free_all(segment, s[0].edges);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the %lld edges of a contact", (long long)total);
     }
     free(body->segment);

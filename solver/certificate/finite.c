@@ -722,8 +722,7 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, uz_error 
         status = look_at_rows(out, of, obstacle, err);
     for (int64_t k = 0; k < n && obstacle; k++)
         uz_obstacle_free(obstacle[k]);
-    free(obstacle);
-    free(apart);
+    uz_free_all(obstacle, apart);
     return status;
 }
 

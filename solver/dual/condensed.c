@@ -155,14 +155,11 @@ static void clear(uz_dual *dual)
 {
     uz_condensed *dense = (uz_condensed *)dual;
     uz_csc_clear(&dense->N_b);
-    free(dense->position);
-    free(dense->L_bb);
+    uz_free_all(dense->position, dense->L_bb);
     uz_reach_free(dense->reach);
     uz_free_all(dense->D_chol, dense->row_of, dense->scale);
-    if (dense->made) {
-        free(dense->made->D);
-        free(dense->made->D_inverse);
-    }
+    if (dense->made)
+        uz_free_all(dense->made->D, dense->made->D_inverse);
     free(dense->made);
 }
 

@@ -237,8 +237,7 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, doub
         *end = UZ_ACTIVE_SOLVED;
         forgive_rounding(r, g, x, active);
     }
-    free(block);
-    free(rows);
+    uz_free_all(block, rows);
     return status;
 }
 

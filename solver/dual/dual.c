@@ -117,14 +117,12 @@ void uz_dual_free(uz_dual *dual)
     else
         uz_csc_clear(&dual->N);
     uz_csc_clear(&dual->Nt);
-    free(dual->row_scale);
-    free(dual->row_weight);
+    uz_free_all(dual->row_scale, dual->row_weight);
     if (dual->lazy) {
         pthread_mutex_destroy(&dual->lazy->making);
         pthread_mutex_destroy(&dual->lazy->known);
     }
-    free(dual->lazy);
-    free(dual);
+    uz_free_all(dual->lazy, dual);
 }
 
 double uz_dual_lambda_max_as_given(const uz_dual *dual)

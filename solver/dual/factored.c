@@ -41,8 +41,7 @@ static void unload(uz_dual_load *load)
     uz_principal_free(x->part);
     uz_principal_free(x->held);
     uz_factor_workspace_free(x->held_ws);
-    free(x->unit);
-    free(x->force);
+    uz_free_all(x->unit, x->force);
     uz_factor_workspace_free(x->ws);
     uz_sparse_unload(&x->sparse);
 }

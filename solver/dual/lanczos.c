@@ -94,8 +94,7 @@ uz_status uz_dual_load_lambda_max(uz_dual_load *load, double *lambda_max, bool w
     }
     if (form->probe)
         form->probe(load, false, 0.0);
-    free(basis);
-    free(alpha);
+    uz_free_all(basis, alpha);
     if (status == UZ_OK && !uz_stop_is_due(&load->stop)) { /* else applications may have been cut short */
         *lambda_max = fmax(0.0, value + residual);
         pthread_mutex_lock(&dual->lazy->known); /* kept for the body's other runs */

@@ -153,7 +153,6 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         *end = UZ_ACTIVE_SOLVED;
     }
     uz_springs_clear(&S);
-    free(of_m);
-    free(of_d);
+    uz_free_all(of_m, of_d);
     return status;
 }

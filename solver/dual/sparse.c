@@ -34,8 +34,7 @@ static bool leave_out_zeros(uz_dual *dual)
 
 static void clear_bounds(uz_bounds *bounds)
 {
-    free(bounds->dof);
-    free(bounds->scale);
+    uz_free_all(bounds->dof, bounds->scale);
     memset(bounds, 0, sizeof *bounds);
 }
 

@@ -92,8 +92,7 @@ void uz_springs_clear(uz_springs *a)
 {
     uz_csc_clear(&a->S);
     uz_analysis_free(a->analysis);
-    free(a->of_K);
-    free(a->of_rows);
+    uz_free_all(a->of_K, a->of_rows);
     a->of_K = a->of_rows = NULL;
     a->analysis = NULL;
 }

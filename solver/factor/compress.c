@@ -116,7 +116,6 @@ cholmod_sparse *uz_compress(int64_t *group, const uz_csc *A, const int64_t *last
             ptr[g + 1] = at;
         }
     }
-    free(next);
-    free(mark);
+    uz_free_all(next, mark);
     return graph;
 }

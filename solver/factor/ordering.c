@@ -27,8 +27,7 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
     }
     for (int64_t k = 0; k < moved; k++)
         perm[kept + k] = tail[k];
-    free(is_last);
-    free(tail);
+    uz_free_all(is_last, tail);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)n);
 }
 

@@ -124,8 +124,7 @@ uz_status uz_paths_create(uz_paths **out, const uz_csc *K, const uz_factor *fact
     }
     if (ok)
         list_links(x, next, owner, &most);
-    free(owner);
-    free(next);
+    uz_free_all(owner, next);
     if (ok) {
         *out = x;
         return UZ_OK;

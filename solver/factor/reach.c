@@ -108,8 +108,7 @@ uz_status uz_reach_create(uz_reach **out, const uz_factor *factor, const int64_t
         const int64_t parent = parent_of(&factor->L, reach->node[k], owner);
         reach->parent[k] = parent < 0 ? -1 : place[parent];
     }
-    free(owner);
-    free(place);
+    uz_free_all(owner, place);
     if (ok) {
         *out = reach;
         return UZ_OK;
@@ -220,8 +219,7 @@ static bool collect(gathering *g, int64_t k, const supernode *s)
             for (int64_t i = from.columns; i < from.rows; i++)
                 to[g->local[from.row[i]]] += left[i];
         }
-        free(child->column);
-        free(child->block);
+        uz_free_all(child->column, child->block);
         child->column = NULL;
         child->block = NULL;
     }
@@ -250,8 +248,7 @@ static bool visit(gathering *g, int64_t k)
         own->next = g->child[parent];
         g->child[parent] = k;
     } else {
-        free(own->column);
-        free(own->block);
+        uz_free_all(own->column, own->block);
         own->column = NULL;
         own->block = NULL;
     }
@@ -277,10 +274,8 @@ uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_er
         g.slot[i] = -1;
     for (int64_t k = 0; ok && k < count; k++)
         ok = visit(&g, k);
-    for (int64_t k = 0; g.shares && k < count; k++) {
-        free(g.shares[k].column);
-        free(g.shares[k].block);
-    }
+    for (int64_t k = 0; g.shares && k < count; k++)
+        uz_free_all(g.shares[k].column, g.shares[k].block);
     uz_free_all(g.shares, g.child, g.slot, g.local, g.gram);
     if (ok)
         return UZ_OK;

@@ -64,10 +64,8 @@ void uz_refill_free(uz_refill *x)
         free(room[k]);
     for (int k = 0; k < UZ_SHARES; k++) {
         free(x->of[k].head);
-        if (k != UZ_REST) {
-            free(x->of[k].local);
-            free(x->of[k].room);
-        }
+        if (k != UZ_REST)
+            uz_free_all(x->of[k].local, x->of[k].room);
     }
     free(x);
 }

@@ -22,8 +22,7 @@ void uz_factor_workspace_free(uz_factor_workspace *ws)
     if (!ws)
         return;
     cholmod_l_finish(&ws->common);
-    free(ws->panel);
-    free(ws);
+    uz_free_all(ws->panel, ws);
 }
 
 void uz_factor_permute(const uz_factor *factor, double *permuted, const double *x)

@@ -308,8 +308,7 @@ static uz_status group_of_rigid(char name[64], double middle[3], abaqus_deck *d,
             middle[c] += mesh->xyz[mesh->dim * list[i].index + c] / (double)count;
     if (status == UZ_OK)
         status = group_of(name, d, "rigid", true, list, count);
-    free(list);
-    free(marked);
+    uz_free_all(list, marked);
     return status;
 }
 
@@ -590,8 +589,7 @@ static uz_status sides_of_nodes(char name[64], abaqus_deck *d, int64_t line, con
                            (long long)alone, from->name);
     if (status == UZ_OK && n > 0)
         status = group_of_sides(name, d, what, list, n);
-    free(list);
-    free(marked);
+    uz_free_all(list, marked);
     return status;
 }
 
@@ -803,8 +801,7 @@ void uz_deck_clear(uz_deck *deck)
     if (!deck)
         return;
     uz_scene_clear(&deck->scene);
-    free(deck->notes);
-    free(deck->node_number);
+    uz_free_all(deck->notes, deck->node_number);
     memset(deck, 0, sizeof *deck);
 }
 

@@ -113,8 +113,7 @@ static uz_status sort_columns(uz_csc *A, int64_t **col, int64_t count, int64_t *
     A->val = val;
     val = NULL;
 done:
-    free(places);
-    free(val);
+    uz_free_all(places, val);
     return status;
 }
 

@@ -177,8 +177,7 @@ static uz_status join_corners(uz_triangles *t, uz_error *err)
     grid.first = uz_alloc(grid.slots, sizeof *grid.first);
     grid.next = uz_alloc(3 * t->n, sizeof *grid.next);
     if (!grid.first || !grid.next) {
-        free(grid.first);
-        free(grid.next);
+        uz_free_all(grid.first, grid.next);
         return uz_no_memory(err, "the corners of a surface");
     }
     for (int64_t i = 0; i < grid.slots; i++)
@@ -195,8 +194,7 @@ static uz_status join_corners(uz_triangles *t, uz_error *err)
         grid.next[i] = grid.first[slot];
         grid.first[slot] = i;
     }
-    free(grid.first);
-    free(grid.next);
+    uz_free_all(grid.first, grid.next);
     for (int64_t i = 0; i < t->n; i++) {
         bool same[3] = {true, true, true};
         for (int c = 0; c < 3; c++)

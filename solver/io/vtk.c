@@ -37,8 +37,7 @@ uz_status vtk_numbers_make(vtk_numbers *out, int64_t n, bool whole, uz_error *er
 
 void vtk_numbers_clear(vtk_numbers *numbers)
 {
-    free(numbers->integer);
-    free(numbers->real);
+    uz_free_all(numbers->integer, numbers->real);
     *numbers = (vtk_numbers){.n = 0};
 }
 

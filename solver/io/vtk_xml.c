@@ -301,8 +301,7 @@ static uz_status unpack(unsigned char *out, uint64_t size, const xml *x, const a
     }
     if (tool)
         libdeflate_free_decompressor(tool);
-    free(packed);
-    free(input);
+    uz_free_all(packed, input);
     return status == UZ_OK && !good ? fail_in(x, of, UZ_ERR_FORMAT, "is not packed by zlib as it says, or cut off")
                                     : status;
 }

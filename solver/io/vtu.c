@@ -51,8 +51,7 @@ void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void
         uz_buffer_put_base64(vtu, out, packed);
     }
     vtu->failed = vtu->failed || !ok;
-    free(head);
-    free(out);
+    uz_free_all(head, out);
     uz_buffer_print(vtu, "</DataArray>\n");
 }
 
@@ -86,8 +85,7 @@ void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
         uz_vtu_array(vtu, "types", UZ_VTU_BYTE, type, mesh->n_elements, 1, NULL);
         uz_buffer_print(vtu, "      </Cells>\n");
     }
-    free(xyz);
-    free(type);
+    uz_free_all(xyz, type);
 }
 
 uz_status uz_vtu_finish(char **text, size_t *len, uz_buffer *vtu, uz_error *err)

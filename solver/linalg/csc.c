@@ -146,8 +146,7 @@ uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t 
         made.ptr[j + 1] = to;
     }
 done:
-    free(order);
-    free(start);
+    uz_free_all(order, start);
     if (status == UZ_OK)
         *out = made;
     else

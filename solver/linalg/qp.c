@@ -1,6 +1,7 @@
 /* The problem in matrices: freeing it, and checking all that can be known without a factorization. */
 #include "uzawa.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/linalg.h"
 
@@ -14,8 +15,7 @@ void uz_qp_clear(uz_qp *qp)
         return;
     uz_csc_clear(&qp->K);
     uz_csc_clear(&qp->N);
-    free(qp->p);
-    free(qp->h);
+    uz_free_all(qp->p, qp->h);
     memset(qp, 0, sizeof *qp);
 }
 

@@ -88,8 +88,7 @@ uz_status uz_box_tree_init(uz_box_tree *out, int64_t n, int dim, const double *b
 
 void uz_box_tree_clear(uz_box_tree *tree)
 {
-    free(tree->item);
-    free(tree->box);
+    uz_free_all(tree->item, tree->box);
     memset(tree, 0, sizeof *tree);
 }
 

@@ -149,8 +149,7 @@ uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y
 
 void uz_line_clear(uz_line *line)
 {
-    free(line->point);
-    free(line->tangent);
+    uz_free_all(line->point, line->tangent);
     uz_box_tree_clear(&line->tree);
     memset(line, 0, sizeof *line);
 }

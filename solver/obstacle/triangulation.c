@@ -195,8 +195,7 @@ static uz_status check_sides(uz_triangulation *t, bool inside, const char *where
                          "the surface is closed and its normals point inwards: of a body that lies within it say "
                          "\"inside\": true; of an obstacle whose file was mirrored say \"flip\": true");
     turn = inside && outwards >= 0;
-    free(seen);
-    free(list);
+    uz_free_all(seen, list);
     if (status == UZ_OK && turn)
         turn_all(t);
     return status;
@@ -308,8 +307,7 @@ uz_status uz_triangulation_init(uz_triangulation *out, int64_t n, const double *
             }
         status = uz_box_tree_init(&t->tree, n, 3, box, err);
     }
-    free(slot);
-    free(box);
+    uz_free_all(slot, box);
     if (status != UZ_OK)
         uz_triangulation_clear(t);
     return status;

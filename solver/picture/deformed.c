@@ -127,8 +127,7 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
         uz_scenery_put_legend(svg, scenery, how->title);
         uz_buffer_print(svg, "</svg>\n");
     }
-    free(value);
-    free(pressure);
+    uz_free_all(value, pressure);
     uz_skin_clear(&skin);
     return status;
 }

@@ -32,8 +32,7 @@ void uz_raster_wipe(uz_raster *raster)
 
 void uz_raster_clear(uz_raster *raster)
 {
-    free(raster->rgba);
-    free(raster->depth);
+    uz_free_all(raster->rgba, raster->depth);
     memset(raster, 0, sizeof *raster);
 }
 

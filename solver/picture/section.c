@@ -233,8 +233,7 @@ uz_status uz_section_compute(uz_surface *out, const uz_scene *scene, const uz_fi
         *out = (uz_surface){.dim = 3, .n_nodes = model.mesh.n_nodes, .n_elements = model.mesh.n_elements};
         status = build(&w, &body, answer, which, most_bytes, hooks, err);
     }
-    free(w.vertex);
-    free(w.mises);
+    uz_free_all(w.vertex, w.mises);
     uz_field_body_clear(&body);
     uz_body_model_clear(&model);
     if (status != UZ_OK)

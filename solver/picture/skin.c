@@ -60,8 +60,7 @@ uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks
 
 void uz_skin_clear(uz_skin *skin)
 {
-    free(skin->first);
-    free(skin->point);
+    uz_free_all(skin->first, skin->point);
     memset(skin, 0, sizeof *skin);
 }
 
@@ -219,7 +218,6 @@ uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_
 
 void uz_skin_edges_clear(uz_skin_edges *edges)
 {
-    free(edges->line);
-    free(edges->outline);
+    uz_free_all(edges->line, edges->outline);
     memset(edges, 0, sizeof *edges);
 }

@@ -60,6 +60,5 @@ void uz_ahead_free(uz_ahead *ahead)
     if (!ahead)
         return;
     uz_aside_finish(&ahead->task);
-    free(ahead->nodal);
-    free(ahead);
+    uz_free_all(ahead->nodal, ahead);
 }

@@ -218,8 +218,7 @@ static uz_status add_elements(balance *b, uz_error *err)
         if (x.count == AT_ONCE || e + 1 == n)
             add_forces(b, &x);
     }
-    free(x.touches);
-    free(x.force);
+    uz_free_all(x.touches, x.force);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld elements", (long long)n);
 }
 

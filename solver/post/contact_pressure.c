@@ -226,7 +226,6 @@ uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_
         if (uz_mesh_hangs(&model->mesh, a))
             nodal[a] = pressure_amid(nodal, &model->mesh, a);
     }
-    free(weight);
-    free(sum);
+    uz_free_all(weight, sum);
     return status;
 }

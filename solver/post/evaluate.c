@@ -282,7 +282,6 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
     if (status == UZ_OK)
         result->evaluation->approach =
             uz_contact_approach(energy, pressed, result->evaluation->overlap, scene->n_contacts);
-    free(displaced.mesh.xyz);
-    free(load);
+    uz_free_all(displaced.mesh.xyz, load);
     return status;
 }

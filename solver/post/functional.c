@@ -409,8 +409,7 @@ static uz_status keep_contacts(const making *k, uz_error *err)
         }
     }
     const bool room = zero && way;
-    free(zero);
-    free(way);
+    uz_free_all(zero, way);
     if (!room)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)model->mesh.n_nodes);

@@ -124,8 +124,7 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
                 strain[a * body->components + c] =
                     uz_mesh_value_amid(&body->model->mesh, a, strain + c, body->components);
         }
-    free(volume);
-    free(done);
+    uz_free_all(volume, done);
     return status;
 }
 

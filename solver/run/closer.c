@@ -84,8 +84,7 @@ static uz_status list_round(uz_closer *out, int64_t *n, int64_t *count, const uz
     } else {
         free(list);
     }
-    free(marked);
-    free(covered);
+    uz_free_all(marked, covered);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld elements", (long long)n_elements);
 }
 
@@ -183,7 +182,6 @@ uz_status uz_closer_make(uz_closer *out, bool *any, const uz_guaranteed *g, cons
 
 void uz_closer_clear(uz_closer *closer)
 {
-    free(closer->bisected);
-    free(closer->u);
+    uz_free_all(closer->bisected, closer->u);
     uz_body_model_clear(&closer->model);
 }

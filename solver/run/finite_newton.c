@@ -309,8 +309,7 @@ static uz_status add_turning(uz_finite_run *run, uz_error *err)
         uz_rigid_turn_stiffness(&run->tangent, &run->base, at->u, f);
     }
     const bool room = f && force;
-    free(f);
-    free(force);
+    uz_free_all(f, force);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on rigid groups");
 }
 
@@ -726,9 +725,7 @@ static uz_status find_carried(bool *carried, double *to, const uz_finite_run *ru
         *carried = *carried || goes;
     }
     const bool room = alike;
-    free(part);
-    free(way);
-    free(alike);
+    uz_free_all(part, way, alike);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a body");
 }
 
@@ -906,8 +903,6 @@ uz_status uz_finite_settle(uz_part *out, uz_finite_run *run, uz_error *err)
     }
     if (status == UZ_OK && *out == UZ_PART_SETTLED)
         status = look_back(out, run, begun, led, err);
-    free(to);
-    free(begun);
-    free(led);
+    uz_free_all(to, begun, led);
     return status;
 }

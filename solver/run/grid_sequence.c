@@ -396,8 +396,7 @@ static uz_status measure_move(double *moved, const uz_result *here, const uz_res
     if (status == UZ_OK)
         status = is_large(&here->summary) ? uz_finite_distance(moved, body, here->free_strain, from, here->u, err)
                                           : uz_strain_energy(moved, body, z, false, err);
-    free(from);
-    free(z);
+    uz_free_all(from, z);
     return status;
 }
 

@@ -270,8 +270,7 @@ static uz_status make_held_stress(uz_guaranteed *g, bool *solved, uz_guarantee *
         if (!pulls || !*solved || status != UZ_OK)
             break;
         uz_qp_clear(&g->qp);
-        free(g->dof);
-        free(g->stress);
+        uz_free_all(g->dof, g->stress);
         g->dof = NULL;
         g->stress = NULL;
         status = make_stress(g, solved, out, err);
@@ -360,8 +359,7 @@ static uz_status hold_closer(uz_guaranteed *closer, const uz_closer *mesh, const
     double *own = press_at_nodes(result),
            *finer = own ? uz_carry_nodal(&mesh->model.mesh, own, result->n_nodes, 1) : NULL;
     const uz_status status = hold(closer, finer, err);
-    free(own);
-    free(finer);
+    uz_free_all(own, finer);
     return status;
 }
 

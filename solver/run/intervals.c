@@ -158,8 +158,7 @@ static uz_status make_coefficients(contact_rows *x, const uz_csc *N, uz_error *e
 static void end_contact_rows(contact_rows *x, uz_cache *cache)
 {
     uz_csc_clear(&x->N);
-    free(x->row);
-    free(x->ends);
+    uz_free_all(x->row, x->ends);
     uz_augmented_clear(&x->regular);
     uz_body_model_clear(&x->held);
     uz_setup_release(cache, x->setup);
@@ -618,8 +617,7 @@ static uz_status weigh(proving *v, uz_quantity_found *out, uz_error *err)
         v->share = interval.local;
         interval.local = NULL;
     }
-    free(interval.residual);
-    free(interval.local);
+    uz_free_all(interval.residual, interval.local);
     return status;
 }
 

@@ -204,10 +204,8 @@ void uz_problem_clear(uz_problem *problem)
         uz_scene_clear(&problem->scene);
     else
         uz_qp_clear(&problem->qp);
-    for (int64_t i = 0; problem->cases && i < problem->n_cases; i++) {
+    for (int64_t i = 0; problem->cases && i < problem->n_cases; i++)
         uz_free_all(problem->cases[i].p, problem->cases[i].h, problem->cases[i].loads);
-    }
-    free(problem->cases);
-    free(problem->quantities);
+    uz_free_all(problem->cases, problem->quantities);
     memset(problem, 0, sizeof *problem);
 }

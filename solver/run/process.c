@@ -48,8 +48,7 @@ void uz_process_warm(void)
         uz_block_syrk_t(N, K, Z, K, C);
     openblas_set_num_threads(1);
     uz_aside_begin(threads);
-    free(Z);
-    free(C);
+    uz_free_all(Z, C);
 }
 
 void uz_process_reserve(uz_reserve *reserve)

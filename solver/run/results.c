@@ -235,8 +235,7 @@ void uz_result_free(uz_result *result)
     uz_mesh_info_clear(&result->mesh);
     if (result->grids)
         free(result->grids->bisected);
-    free(result->grids);
-    free(result);
+    uz_free_all(result->grids, result);
 }
 
 void uz_results_free(uz_result **results, int64_t n)

@@ -132,8 +132,7 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
     }
     if (status != UZ_OK && err)
         *err = own;
-    free(b.todo);
-    free(b.again);
+    uz_free_all(b.todo, b.again);
     uz_candidates_clear(&b.wanted);
     uz_nearby_free(b.nearby);
     uz_state_free(b.carried);

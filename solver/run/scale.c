@@ -66,8 +66,7 @@ uz_status uz_run_scale_load(uz_run *run, uz_error *err)
         load->h = load->h_all = own + run->d;
     }
     if (!own || !row_room) {
-        free(own == load->owned ? NULL : own);
-        free(row_room);
+        uz_free_all(own == load->owned ? NULL : own, row_room);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
     }
     const double size = drive(run, row_room);

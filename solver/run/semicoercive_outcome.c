@@ -83,8 +83,7 @@ uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)
                 z[j] += y[c] * s->Z[c * s->d + j];
         name_dofs(dofs, sizeof dofs, z, s->d);
     }
-    free(y);
-    free(z);
+    uz_free_all(y, z);
     if (status != UZ_OK || how == UZ_PRESSED_ON)
         return status;
     if (how == UZ_PUSHED_AWAY)

@@ -163,8 +163,7 @@ static uz_status choose_rows(uz_setup *setup, const uz_scene *scene, const uz_ca
         status = uz_fail(err, status, "", "no memory for the gaps of %lld contacts", (long long)model->m);
     else
         status = UZ_OK; /* the load will tell what is wrong with it */
-    free(p);
-    free(h);
+    uz_free_all(p, h);
     if (status == UZ_OK && setup->rows.in)
         status = uz_candidates_reduce(&setup->N_in, &model->N, &setup->rows, err);
     return status;

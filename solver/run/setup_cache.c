@@ -124,8 +124,7 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **out, size_t *count, uz
     found.list = uz_alloc_zero((int64_t)found.room, sizeof *found.list);
     found.factors = uz_alloc_zero((int64_t)found.room, sizeof *found.factors);
     if (!found.list || !found.factors) {
-        free(found.list);
-        free(found.factors);
+        uz_free_all(found.list, found.factors);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to list the cache");
     }
     uz_table_visit(cache, UZ_ITEM_SETUP, describe_one, &found);

@@ -169,8 +169,7 @@ uz_status uz_carry_start(uz_state **out, const uz_result *result, const uz_mesh_
         for (int64_t k = first; k < end; k++)
             row_at[here->contact_node[k]] = 0;
     }
-    free(row_at);
-    free(next);
+    uz_free_all(row_at, next);
     if (!room || (whole && !complete(state, m))) {
         uz_state_free(state);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from an answer with %lld contacts",

@@ -99,8 +99,7 @@ uz_status uz_mesh_bisect(uz_mesh *mesh, const int64_t *marked, int64_t n, uz_err
     if (listed && !x.all.too_many)
         publish(&x);
     status = uz_refinement_end(&x.all, listed, err);
-    free(x.part);
-    free(x.waits);
+    uz_free_all(x.part, x.waits);
     return status;
 }
 
@@ -401,6 +400,5 @@ static void publish(bisection *x)
         }
     }
     uz_refinement_publish(&x->all, &fine, root, side_of);
-    free(root);
-    free(side_of);
+    uz_free_all(root, side_of);
 }

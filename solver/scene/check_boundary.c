@@ -219,8 +219,7 @@ static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, in
                         "and \"%.40s\"), too; name each pair once, several in one contact as lists",
                         mine->on, mine->with, (long long)k, its->on, its->with);
     }
-    free(of[0]);
-    free(of[1]);
+    uz_free_all(of[0], of[1]);
     return status;
 }
 

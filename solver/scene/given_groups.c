@@ -176,8 +176,7 @@ static bool drop_repeated(uz_group *group, const number_list *code)
     if (seen && sorted.count < code->count)
         group->n_faces = kept;
     const bool done = seen != NULL;
-    free(seen);
-    free(sorted.value);
+    uz_free_all(seen, sorted.value);
     return done;
 }
 
@@ -296,7 +295,6 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
         *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     }
     uz_corner_table_clear(&work.sides);
-    free(work.nodes.word);
-    free(work.elements.word);
+    uz_free_all(work.nodes.word, work.elements.word);
     return status;
 }

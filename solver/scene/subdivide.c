@@ -340,6 +340,5 @@ static void publish(subdivision *x)
         fine.hangs = NULL;
     }
     uz_refinement_publish(&x->all, &fine, root, side);
-    free(root);
-    free(side);
+    uz_free_all(root, side);
 }

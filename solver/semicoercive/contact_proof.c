@@ -69,8 +69,7 @@ static uz_status prepare(prover *x, const uz_contact_claim *claim, uz_error *err
             x->open[i] = gap > 2.0 * reach;
         }
     }
-    free(zero);
-    free(spare);
+    uz_free_all(zero, spare);
     return status;
 }
 

@@ -47,8 +47,7 @@ static uz_status without_empty(uz_csc *out, const uz_csc *K, uz_error *err)
             out->ptr[number[j] + 1] = at;
     }
 done:
-    free(number);
-    free(used);
+    uz_free_all(number, used);
     return status;
 }
 
