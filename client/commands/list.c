@@ -2,7 +2,6 @@
 #include "commands/fetch.h"
 #include "show/report.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -3,7 +3,6 @@
 #include "commands/fetch.h"
 #include "show/report.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

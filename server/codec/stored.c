@@ -6,7 +6,6 @@
 #include "codec/problem.h"
 #include "codec/text.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -5,7 +5,6 @@
 #include "work/solver_process.h"
 #include "work/watch.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -11,7 +11,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 enum { POINTS = 4, MOMENTS = UZ_BOUND_MOMENTS }; /* products of three polynomials of degree 2 */
 

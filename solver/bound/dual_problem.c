@@ -16,7 +16,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "linalg/blas.h"
-#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>

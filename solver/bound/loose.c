@@ -12,7 +12,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 /* A moment is taken where the answer presses by more than this part of its largest pressure on both sides of it; where
  * it does so on one alone, as of a body that a wall holds at a corner, its pressure counts less. */

@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "core/random.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

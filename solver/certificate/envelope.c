@@ -4,7 +4,6 @@
 #include "core/error.h"
 #include "linalg/blas.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

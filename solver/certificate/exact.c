@@ -9,7 +9,6 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Bits of roots and of what is added to them, and what more than covers their rounding, which is below 2^-PLACES. */
 enum { BITS = 256, PLACES = 44 };

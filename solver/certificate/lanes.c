@@ -11,7 +11,6 @@
 #include "core/error.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Half of a row of lanes: what a register holds. */

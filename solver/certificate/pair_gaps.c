@@ -17,7 +17,6 @@
 #include "core/vector3.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 enum { CHORDS = 16 };
 

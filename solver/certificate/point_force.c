@@ -12,8 +12,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Rotations about one axis after the other, each by the best angle but for the first ones, which leave saddles, until

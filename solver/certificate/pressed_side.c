@@ -3,7 +3,6 @@
  * derivative is (N_b,1 e) x t_2 + t_1 x (N_b,2 e), and likewise in the plane. */
 #include "certificate/pressed_side.h"
 
-#include <math.h>
 #include <string.h>
 
 enum { SIDE_DOFS = 3 * UZ_SIDE_NODES };

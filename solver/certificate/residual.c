@@ -8,7 +8,6 @@
 #include "certificate/double_double.h"
 #include "core/alloc.h"
 #include "core/cpu.h"
-#include "core/error.h"
 #include "linalg/pieces.h"
 
 #include <stdlib.h>

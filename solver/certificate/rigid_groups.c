@@ -1,7 +1,6 @@
 /* rigid_groups.c: rigid groups of an answer of large deformation, in extended precision. */
 #include "certificate/rigid_groups.h"
 
-#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"

@@ -9,7 +9,6 @@
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Rows that are moved together, and words multiplied in all: about a second. */
 enum { MOST_TOGETHER = 32 };

@@ -5,7 +5,6 @@
 #include "certificate/swallowed.h"
 
 #include "assembly/body_parts.h"
-#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"

@@ -5,7 +5,6 @@
 #include "core/error.h"
 #include "dual/form.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 uz_status uz_dual_block_create(uz_dual_block **out, const uz_dual *dual, int64_t blocks, uz_error *err)

@@ -8,7 +8,6 @@
 #include "linalg/blas.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MAX_STEPS = 120, CHECK_EVERY = 4 };

@@ -7,7 +7,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Sigma times the rows' own compliances with diag(K)^-1 for K^-1: first, and by what it grows. Beyond the last there is

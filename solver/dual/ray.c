@@ -7,7 +7,6 @@
 #include "law/sign.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MAX_STEPS = 300 };

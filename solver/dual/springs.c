@@ -4,7 +4,6 @@
 #include "core/error.h"
 #include "linalg/linalg.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* Entries of S, counted with repetitions, over those of K and N: beyond it S is no sparse matrix any more. */

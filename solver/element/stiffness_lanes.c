@@ -7,7 +7,6 @@
 #include "element/lane_shape.h"
 
 #include <float.h>
-#include <string.h>
 
 enum { LANES = UZ_STRAIN_LANES };
 

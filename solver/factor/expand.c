@@ -6,8 +6,6 @@
 
 #include "core/alloc.h"
 
-#include <stdlib.h>
-
 /* The sizes of all supernodes: super, pi, px, and the largest. */
 static void size_supernodes(cholmod_factor *L, const cholmod_factor *G, const int64_t *start)
 {

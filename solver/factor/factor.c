@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "core/hooks.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <suitesparse/SuiteSparse_config.h>

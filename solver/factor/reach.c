@@ -9,7 +9,6 @@
 #include "linalg/blas.h"
 #include "core/error.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* Columns `first` up to first + columns of L, and their `rows` rows, the first of which are those columns. */

@@ -9,7 +9,6 @@
 #include "factor/factor_private.h"
 
 #include "core/cpu.h"
-#include "core/error.h"
 
 #include <string.h>
 

@@ -6,7 +6,6 @@
 #include "finite/finite_element.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Elastic ground: along the axes, whatever turns; its forces are linear in displacements. */

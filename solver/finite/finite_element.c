@@ -24,7 +24,6 @@
 #include "finite/point_lanes.h"
 
 #include <math.h>
-#include <string.h>
 
 /* NODES: the most, by fours; AROUND: the derivative of what is around the axis, after those in the plane. */
 enum { N_STRAINS = UZ_FINITE_STRAINS, LANES = UZ_FINITE_LANES, POINTS = UZ_FINITE_POINTS, AROUND = 4 };

@@ -1,7 +1,6 @@
 #include "finite/follower.h"
 
 #include "assembly/parts.h"
-#include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
 #include "finite/point_load.h"
@@ -9,8 +8,6 @@
 #include "scene/check.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* Entries of the skew part that are less than this part of the largest entry of a side are rounding. */
 #define ROUNDING 1e-12

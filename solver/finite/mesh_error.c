@@ -13,7 +13,6 @@
 #include "finite/mesh_error.h"
 
 #include "assembly/nodal_strains.h"
-#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "finite/finite_body.h"

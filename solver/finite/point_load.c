@@ -7,7 +7,6 @@
 #include "scene/check.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* B of a group that has a rotation is not less than this part of its largest entry. */

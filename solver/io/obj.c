@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

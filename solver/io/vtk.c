@@ -6,7 +6,6 @@
 #include "io/mesh_reader.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 const vtk_type VTK_TYPES[] = {

@@ -3,7 +3,6 @@
 #include "core/alloc.h"
 
 #include <libdeflate.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Of numbers before compression; a reader needs one block at a time. */

@@ -5,7 +5,6 @@
 #include "core/error.h"
 #include "linalg/linalg.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 size_t uz_csc_bytes(const uz_csc *A)

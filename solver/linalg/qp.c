@@ -6,7 +6,6 @@
 #include "linalg/linalg.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 void uz_qp_clear(uz_qp *qp)

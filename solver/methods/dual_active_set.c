@@ -13,7 +13,6 @@
 #include "methods/exchange.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /* The first turn: so many columns of D. */
 #define FIRST_TURN 64.0

@@ -2,7 +2,6 @@
 #include "obstacle/check.h"
 #include "obstacle/vectors.h"
 
-#include <math.h>
 #include <string.h>
 
 static uz_status check(const uz_obstacle_subject *s)

@@ -12,7 +12,6 @@
 #include "obstacle/pieces.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Triangles with a height below this part of their longest edge have no normal: it would be rounding. */

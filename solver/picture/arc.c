@@ -4,7 +4,6 @@
 #include "core/error.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /* By node, of the contact at hand. */
 typedef struct {

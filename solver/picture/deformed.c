@@ -4,7 +4,6 @@
 #include "picture/scenery.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 enum { WIDTH = 900 };
 

@@ -14,7 +14,6 @@
 #include "post/parts.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_CUTS = UZ_ELEMENT_SIDES * UZ_SIDE_NODES };

@@ -4,7 +4,6 @@
 #include "core/aside.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { LEAST = 20000 }; /* elements; of fewer the estimate takes less than a millisecond */

@@ -10,7 +10,6 @@
 #include "core/aside.h"
 #include "core/error.h"
 #include "core/vector3.h"
-#include "linalg/linalg.h"
 #include "linalg/pieces.h"
 #include "post/parts.h"
 

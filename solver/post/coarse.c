@@ -13,7 +13,6 @@
 #include "scene/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /* Sides along which the obstacle's normal turns by less than this (rad) see it as flat: 12 of them to its radius. */
 #define LEAST_TURN 0.08

@@ -17,7 +17,6 @@
 #include "core/error.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* By node; zero where the contact at hand is not. */

@@ -5,7 +5,6 @@
 #include "core/aside.h"
 #include "core/error.h"
 #include "finite/follower.h"
-#include "core/hooks.h"
 #include "post/balance.h"
 #include "post/overlap.h"
 #include "post/parts.h"

@@ -9,11 +9,9 @@
  * out. */
 #include "post/balance.h"
 
-#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/vector3.h"
-#include "post/parts.h"
 #include "scene/scene.h"
 
 #include <math.h>

@@ -16,7 +16,6 @@
  * leverage.c says by how much. */
 #include "post/balance.h"
 
-#include "assembly/parts.h"
 #include "assembly/strain_group.h"
 #include "core/cpu.h"
 #include "post/parts.h"

@@ -13,7 +13,6 @@
 #include "core/hooks.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { DIM = 3, BETWEEN_QUESTIONS = 1024, MOST_VALUES = 2 * UZ_FIELD_COMPONENTS, MOST_MATERIALS = 8 };

@@ -7,10 +7,8 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "post/parts.h"
-#include "scene/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* How far outside of an element, in its local coordinates, a point still counts as its own: rounding, and the sagitta

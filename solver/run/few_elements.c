@@ -22,14 +22,11 @@
 #include "finite/mesh_error.h"
 #include "post/balance.h"
 #include "run/finite.h"
-#include "run/problem.h"
 #include "run/results.h"
-#include "run/settings.h"
 #include "run/transfer.h"
 #include "scene/bisect.h"
 #include "scene/subdivide.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -16,10 +16,8 @@
 #include "core/error.h"
 #include "dual/dual.h"
 #include "linalg/blas.h"
-#include "linalg/linalg.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* A gap below this part of the body's extent is one. */

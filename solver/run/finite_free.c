@@ -14,7 +14,6 @@
 #include "core/error.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The springs, in parts of each dof's stiffness; and softer, so that over the body's extent they bear no more than a

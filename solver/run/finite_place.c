@@ -4,10 +4,8 @@
 #include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "linalg/linalg.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 uz_status uz_finite_place_init(uz_finite_place *place, const uz_finite_run *run, uz_error *err)

@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "finite/mesh_error.h"
 #include "linalg/blas.h"
-#include "linalg/linalg.h"
 #include "post/evaluate.h"
 #include "run/quantities.h"
 

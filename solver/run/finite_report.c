@@ -10,11 +10,9 @@
 #include "finite/mesh_error.h"
 #include "linalg/linalg.h"
 #include "post/evaluate.h"
-#include "run/results.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* An obstacle that stands deeper in a side between rows than this part of its length, or presses it from farther away:

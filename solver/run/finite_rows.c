@@ -10,7 +10,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "law/law.h"
-#include "linalg/linalg.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -32,9 +32,7 @@
 #include "run/results.h"
 #include "run/settings.h"
 #include "run/transfer.h"
-#include "scene/check.h"
 #include "scene/grids.h"
-#include "scene/scene.h"
 #include "scene/subdivide.h"
 
 #include <math.h>

@@ -7,7 +7,6 @@
 #include "certificate/envelope.h"
 #include "run/cost.h"
 #include "run/finite.h"
-#include "run/problem.h"
 #include "factor/factor.h"
 #include "run/rows.h"
 #include "run/settings.h"

@@ -7,7 +7,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 const char *uz_quantity_place(char where[UZ_QUANTITY_POINTER], const uz_problem *problem, int64_t i, const char *key)

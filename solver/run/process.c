@@ -8,7 +8,6 @@
 #include "linalg/blas.h"
 
 #include <signal.h>
-#include <stdlib.h>
 
 /* Declared here rather than by the vendors' headers, which differ between compilers and packages. */
 extern int openblas_get_num_threads(void);

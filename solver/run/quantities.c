@@ -21,7 +21,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "linalg/blas.h"
 #include "post/balance.h"
 #include "post/functional.h"
 #include "run/problem.h"

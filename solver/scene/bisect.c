@@ -19,7 +19,6 @@
 #include "core/error.h"
 #include "scene/refinement.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { CORNERS = 4, FROM = 8 };

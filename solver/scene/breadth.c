@@ -4,7 +4,6 @@
 #include "element/element.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /* Slabs across an axis, each as thick as two layers of nodes are, so that it does not fall apart where these are
  * uneven.

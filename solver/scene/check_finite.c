@@ -9,7 +9,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 bool uz_has_finite_law(const uz_scene *scene)
 {

@@ -2,7 +2,6 @@
 #include "scene/scene.h"
 #include "core/alloc.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 void uz_given_mesh_clear(uz_given_mesh *mesh)

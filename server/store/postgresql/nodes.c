@@ -3,7 +3,6 @@
 #include "store/nodes.h"
 #include "store/postgresql/internal.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -4,7 +4,6 @@
 #include "core/alloc.h"
 
 #include <gnutls/crypto.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
