@@ -87,7 +87,7 @@ static void find_begins(whole *w)
 }
 
 /* The largest of the displacements, each times its size. */
-static inline __attribute__((always_inline)) void find_largest(four *largest, const whole *w, const four *v)
+UZ_INLINE void find_largest(four *largest, const whole *w, const four *v)
 {
     four most = {0.0};
     for (int column = 0; column < DOFS; column++) {
@@ -99,8 +99,7 @@ static inline __attribute__((always_inline)) void find_largest(four *largest, co
 }
 
 /* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
-static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, const whole *w, const four *v, int count,
-                                                           int fused)
+UZ_INLINE void multiply(four *hi, four *lo, const whole *w, const four *v, int count, int fused)
 {
     four most;
     find_largest(&most, w, v);
@@ -136,7 +135,7 @@ static inline __attribute__((always_inline)) void multiply(four *hi, four *lo, c
     }
 }
 
-static inline __attribute__((always_inline)) void layer(const whole *w, const planes *p, int fused)
+UZ_INLINE void layer(const whole *w, const planes *p, int fused)
 {
     const int64_t *cells = w->brick->cells;
     for (int64_t j = 0; j < cells[1]; j++)

@@ -114,8 +114,7 @@ typedef struct {
 enum { VECTORS = 8 };
 
 /* From entry j on of u, p, c, K u, K c, e, e_u and the weights. */
-static inline __attribute__((always_inline)) void add_four(sums *s, const double *const x[VECTORS], int64_t j,
-                                                           int fused)
+UZ_INLINE void add_four(sums *s, const double *const x[VECTORS], int64_t j, int fused)
 {
     four v[VECTORS];
     for (int k = 0; k < VECTORS; k++)
@@ -142,7 +141,7 @@ static inline __attribute__((always_inline)) void add_four(sums *s, const double
     s->anything |= ((bits)u | (bits)c | (bits)e_u) & INT64_MAX;
 }
 
-static inline __attribute__((always_inline)) void add_all(sums *s, const double *const x[VECTORS], int64_t d, int fused)
+UZ_INLINE void add_all(sums *s, const double *const x[VECTORS], int64_t d, int fused)
 {
     double rest[VECTORS][4] = {{0}};
     const double *last[VECTORS];

@@ -147,7 +147,7 @@ void uz_lane_certifier_free(uz_lane_certifier *c)
 }
 
 /* hi + lo += a x, lane by lane: dd_add_product of double_double.h. */
-static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *lo, double a, const lanes *x, int fused)
+UZ_INLINE void add_product(lanes *hi, lanes *lo, double a, const lanes *x, int fused)
 {
     const lanes product = a * *x;
     lanes error = {0.0};
@@ -161,14 +161,14 @@ static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *
 }
 
 /* sum += |x| */
-static inline __attribute__((always_inline)) void add_magnitude(lanes *sum, const lanes *x)
+UZ_INLINE void add_magnitude(lanes *sum, const lanes *x)
 {
     *sum += (lanes)((lane_bits)*x & INT64_MAX);
 }
 
 /* Row j is complete: what it adds to the sums. hi + lo: (K u)_j, lost. */
-static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *c, int half, int64_t j, lanes *hi,
-                                                             lanes *lo, const lanes *u, const lanes *p, int fused)
+UZ_INLINE void finish_row(uz_lane_certifier *c, int half, int64_t j, lanes *hi, lanes *lo, const lanes *u,
+                          const lanes *p, int fused)
 {
     sums *s = &c->sum[half];
     const uz_csc *N = c->N;
@@ -216,8 +216,7 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
 }
 
 /* One pass over the lower triangle. When column j is done so is row j: the columns before it have added their part. */
-static inline __attribute__((always_inline)) void pass(uz_lane_certifier *c, const double *U, const double *P,
-                                                       int fused)
+UZ_INLINE void pass(uz_lane_certifier *c, const double *U, const double *P, int fused)
 {
     const uz_csc *K = c->K;
     const lanes *u = (const lanes *)U, *p = (const lanes *)P, zero = {0.0};

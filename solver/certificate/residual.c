@@ -23,8 +23,7 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 #define HIGH_HALF(x)  __builtin_shufflevector(x, x, 2, 3)
 
 /* dd_add_product, lane by lane. */
-static inline __attribute__((always_inline)) void add_product4(four *hi, four *lo, const four *a, const four *b,
-                                                               int fused)
+UZ_INLINE void add_product4(four *hi, four *lo, const four *a, const four *b, int fused)
 {
     const four product = *a * *b;
     four error = {0.0};
@@ -36,7 +35,7 @@ static inline __attribute__((always_inline)) void add_product4(four *hi, four *l
     *hi = sum;
 }
 
-static inline __attribute__((always_inline)) void add_product2(two *hi, two *lo, const two *a, const two *b, int fused)
+UZ_INLINE void add_product2(two *hi, two *lo, const two *a, const two *b, int fused)
 {
     const two product = *a * *b;
     two error = {0.0};
@@ -49,14 +48,14 @@ static inline __attribute__((always_inline)) void add_product2(two *hi, two *lo,
 }
 
 /* dd_add, lane by lane. */
-static inline __attribute__((always_inline)) void add4(four *hi, four *lo, const four *x)
+UZ_INLINE void add4(four *hi, four *lo, const four *x)
 {
     const four sum = *hi + *x, back = sum - *hi;
     *lo += (*hi - (sum - back)) + (*x - back);
     *hi = sum;
 }
 
-static inline __attribute__((always_inline)) void add2(two *hi, two *lo, const two *x)
+UZ_INLINE void add2(two *hi, two *lo, const two *x)
 {
     const two sum = *hi + *x, back = sum - *hi;
     *lo += (*hi - (sum - back)) + (*x - back);
@@ -80,7 +79,7 @@ typedef struct {
 } row_sums;
 
 /* Row j += its lanes. */
-static inline __attribute__((always_inline)) void add_lanes(const product_of *q, int64_t j, const row_sums *s)
+UZ_INLINE void add_lanes(const product_of *q, int64_t j, const row_sums *s)
 {
     const two high = HIGH_HALF(s->hi4);
     two hi = LOW_HALF(s->hi4), lo = (LOW_HALF(s->lo4) + HIGH_HALF(s->lo4)) + s->lo2;
@@ -94,8 +93,7 @@ static inline __attribute__((always_inline)) void add_lanes(const product_of *q,
 }
 
 /* Entries k to end of column j, which lie below the diagonal: to row j goes a x_i, to row i goes a x_j. */
-static inline __attribute__((always_inline)) void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end,
-                                                            double x_j, int fused)
+UZ_INLINE void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end, double x_j, int fused)
 {
     const int32_t *idx = q->A->idx;
     const four x_j4 = {x_j, x_j, x_j, x_j};
@@ -127,7 +125,7 @@ static inline __attribute__((always_inline)) void take_runs(row_sums *s, const p
     }
 }
 
-static inline __attribute__((always_inline)) void prepare_column(const product_of *q, int64_t j)
+UZ_INLINE void prepare_column(const product_of *q, int64_t j)
 {
     const uz_csc *A = q->A;
     int64_t k = A->ptr[j];
@@ -147,7 +145,7 @@ static inline __attribute__((always_inline)) void prepare_column(const product_o
         q->weight[j] = uz_dof_weight(A, j);
 }
 
-static inline __attribute__((always_inline)) void take_column(const product_of *q, int64_t j, int fused)
+UZ_INLINE void take_column(const product_of *q, int64_t j, int fused)
 {
     const uz_csc *A = q->A;
     row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
@@ -169,7 +167,7 @@ typedef struct {
     four hi4[2], lo4[2];
 } pair_sums;
 
-static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64_t j, int64_t end_of_all)
+UZ_INLINE bool is_pair(const uz_csc *A, int64_t j, int64_t end_of_all)
 {
     if (j + 1 >= end_of_all)
         return false;
@@ -178,7 +176,7 @@ static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64
 }
 
 /* Rows j and j + 1 += their lanes: in fours two of the first beside two of the second. */
-static inline __attribute__((always_inline)) void add_pair_lanes(const product_of *q, int64_t j, const pair_sums *s)
+UZ_INLINE void add_pair_lanes(const product_of *q, int64_t j, const pair_sums *s)
 {
     const four high = __builtin_shufflevector(s->hi4[0], s->hi4[1], 2, 3, 6, 7);
     four hi = __builtin_shufflevector(s->hi4[0], s->hi4[1], 0, 1, 4, 5),
@@ -196,7 +194,7 @@ static inline __attribute__((always_inline)) void add_pair_lanes(const product_o
 }
 
 /* What is left of one column of a pair. */
-static inline __attribute__((always_inline)) void take_rest(const product_of *q, int64_t j, int64_t k, int fused)
+UZ_INLINE void take_rest(const product_of *q, int64_t j, int64_t k, int fused)
 {
     if (k == q->A->ptr[j + 1])
         return;
@@ -205,7 +203,7 @@ static inline __attribute__((always_inline)) void take_rest(const product_of *q,
     add_lanes(q, j, &s);
 }
 
-static inline __attribute__((always_inline)) void take_pair(const product_of *q, int64_t j, int fused)
+UZ_INLINE void take_pair(const product_of *q, int64_t j, int fused)
 {
     const uz_csc *A = q->A;
     const int32_t *idx = A->idx;
@@ -252,8 +250,8 @@ static inline __attribute__((always_inline)) void take_pair(const product_of *q,
 }
 
 /* hi + lo -= p + N'r in row j */
-static inline __attribute__((always_inline)) void finish_row(const uz_residuals *out, int64_t j, const double *lo,
-                                                             const uz_csc *N, const double *p, const double *r)
+UZ_INLINE void finish_row(const uz_residuals *out, int64_t j, const double *lo, const uz_csc *N, const double *p,
+                          const double *r)
 {
     const double low = lo[j]; /* e_u may stand there */
     double_double sum = {out->Ku[j], low};
@@ -267,8 +265,7 @@ static inline __attribute__((always_inline)) void finish_row(const uz_residuals 
 }
 
 /* The same in rows j to j + 3, which N does not touch. */
-static inline __attribute__((always_inline)) void finish_four(const uz_residuals *out, int64_t j, const double *lo,
-                                                              const double *p)
+UZ_INLINE void finish_four(const uz_residuals *out, int64_t j, const double *lo, const double *p)
 {
     const four load = -READ(four, p + j), Kc = READ(four, out->Kc + j);
     four hi = READ(four, out->Ku + j), low = READ(four, lo + j);
@@ -280,7 +277,7 @@ static inline __attribute__((always_inline)) void finish_four(const uz_residuals
     AT(four, out->Ku + j) = Ku;
 }
 
-static inline __attribute__((always_inline)) void multiply(const product_of *q, int64_t begin, int64_t end, int fused)
+UZ_INLINE void multiply(const product_of *q, int64_t begin, int64_t end, int fused)
 {
     for (int64_t j = begin; j < end; j++) {
         prepare_column(q, j);
@@ -310,7 +307,7 @@ typedef struct {
     const uz_csc *N;
 } finishing;
 
-static inline __attribute__((always_inline)) void finish(const finishing *x, int64_t begin, int64_t end)
+UZ_INLINE void finish(const finishing *x, int64_t begin, int64_t end)
 {
     const uz_csc *N = x->N;
     for (int64_t j = begin; j < end;)

@@ -28,7 +28,7 @@ typedef struct {
 } panel_of;
 
 /* b = L^-1 b on the columns, and what that takes from the rows below. */
-static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
+UZ_INLINE void eliminate(const panel_of *s)
 {
     lanes *b = s->b;
     for (int64_t j = 0; j < s->cols; j += PANEL) {
@@ -58,7 +58,7 @@ static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
 }
 
 /* b_j -= L_ij b_i summed over the rows below PANEL columns from j on. */
-static inline __attribute__((always_inline)) void gather_panel(lanes *b, const double *L, int64_t rows, int64_t j)
+UZ_INLINE void gather_panel(lanes *b, const double *L, int64_t rows, int64_t j)
 {
     const double *L0 = L, *L1 = L0 + rows, *L2 = L1 + rows, *L3 = L2 + rows;
     lanes x0 = b[2 * j], x1 = b[2 * j + 2], x2 = b[2 * j + 4], x3 = b[2 * j + 6];
@@ -86,7 +86,7 @@ static inline __attribute__((always_inline)) void gather_panel(lanes *b, const d
 }
 
 /* b = L'^-1 b on the columns, the rows below being known. */
-static inline __attribute__((always_inline)) void substitute_back(const panel_of *s)
+UZ_INLINE void substitute_back(const panel_of *s)
 {
     lanes *b = s->b;
     int64_t rest = s->cols % PANEL, width = rest > 0 ? rest : PANEL;

@@ -72,7 +72,7 @@ void uz_refill_free(uz_refill *x)
 
 /* uz_block_outer by small tiles. Up to three entries behind A's columns are read, and rows of C up to a multiple of
  * TILE written. */
-static inline __attribute__((always_inline)) void multiply_tile(const uz_outer *p, int64_t i, int64_t c, int columns)
+UZ_INLINE void multiply_tile(const uz_outer *p, int64_t i, int64_t c, int columns)
 {
     four sum[TILE] = {{0}};
     for (int64_t q = 0; q < p->k; q++) {
@@ -86,7 +86,7 @@ static inline __attribute__((always_inline)) void multiply_tile(const uz_outer *
 }
 
 /* Two tiles, one below the other: sums enough that none waits for the last one's. */
-static inline __attribute__((always_inline)) void multiply_two(const uz_outer *p, int64_t i, int64_t c)
+UZ_INLINE void multiply_two(const uz_outer *p, int64_t i, int64_t c)
 {
     four low[TILE] = {{0}}, high[TILE] = {{0}};
     for (int64_t q = 0; q < p->k; q++) {
@@ -108,7 +108,7 @@ static inline int64_t first_row(const uz_outer *p, int64_t column)
     return column > p->skip ? (column - p->skip) / TILE * TILE : 0;
 }
 
-static inline __attribute__((always_inline)) void multiply(const uz_outer *p)
+UZ_INLINE void multiply(const uz_outer *p)
 {
     int64_t c = 0;
     for (; c + TILE <= p->n; c += TILE) {
@@ -145,8 +145,7 @@ static int64_t pitch_of(int64_t rows)
 }
 
 /* sum_k = row i.. of the first j columns of the block times their row j + k. */
-static inline __attribute__((always_inline)) void add_left(four sum[TILE], const double *block, int64_t rows, int64_t i,
-                                                           int64_t j, int width)
+UZ_INLINE void add_left(four sum[TILE], const double *block, int64_t rows, int64_t i, int64_t j, int width)
 {
     for (int64_t q = 0; q < j; q++) {
         const four a = *(const four *)(block + i + q * rows);
@@ -158,7 +157,7 @@ static inline __attribute__((always_inline)) void add_left(four sum[TILE], const
 
 /* Columns j .. j + width - 1 of a block whose columns before them are done. Returns how many of them have pivots that
  * are positive. */
-static inline __attribute__((always_inline)) int factor_strip(double *block, int64_t rows, int64_t j, int width)
+UZ_INLINE int factor_strip(double *block, int64_t rows, int64_t j, int width)
 {
     double L[TILE][TILE] = {{0}}, inverse[TILE] = {0}; /* of their own rows */
     four own[TILE] = {{0}};
@@ -196,7 +195,7 @@ static inline __attribute__((always_inline)) int factor_strip(double *block, int
 }
 
 /* The first `columns` columns of a block become those of its Cholesky factor, some at a time. */
-static inline __attribute__((always_inline)) int64_t factor_columns(double *block, int64_t columns, int64_t rows)
+UZ_INLINE int64_t factor_columns(double *block, int64_t columns, int64_t rows)
 {
     int64_t j = 0;
     while (j < columns) {
@@ -234,7 +233,7 @@ typedef struct {
 } band;
 
 /* What the band takes from supernode d, in pieces of columns that fit in the room. */
-static inline __attribute__((always_inline)) void take(const band *of, int64_t d)
+UZ_INLINE void take(const band *of, int64_t d)
 {
     const uz_refill *x = of->x;
     const cholmod_factor *L = x->L;
@@ -395,7 +394,7 @@ static void divide_band(void *ctx, int half)
 }
 
 /* From what a supernode has of K to its columns of the factor, as uz_block_factor. */
-static inline __attribute__((always_inline)) int64_t make_together(pair *p, int64_t columns)
+UZ_INLINE int64_t make_together(pair *p, int64_t columns)
 {
     const double c = (double)columns, r = (double)p->rows, half = (c * r - c * c / 2) / 2;
     p->middle = half > c * c / 2 ? (int64_t)(half / c + c / 2) : (int64_t)sqrt(2 * half); /* of its entries */
@@ -418,7 +417,7 @@ static inline __attribute__((always_inline)) int64_t make_together(pair *p, int6
 /* ---- all of them */
 
 /* A supernode of a share, from x->K. */
-static inline __attribute__((always_inline)) void make(uz_refill *x, int share, int64_t s, const kernels *by)
+UZ_INLINE void make(uz_refill *x, int share, int64_t s, const kernels *by)
 {
     const cholmod_factor *L = x->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *row = L->s, *ptr = x->K->p, *index = x->K->i;
@@ -459,7 +458,7 @@ static inline __attribute__((always_inline)) void make(uz_refill *x, int share, 
 }
 
 /* The supernodes of a share: until a pivot is not positive. */
-static inline __attribute__((always_inline)) void make_all(uz_refill *x, int share)
+UZ_INLINE void make_all(uz_refill *x, int share)
 {
     const kernels by = kernels_here();
     const int64_t count = (int64_t)x->L->nsuper;

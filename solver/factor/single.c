@@ -30,7 +30,7 @@ typedef void (*panel_step)(const panel_of *s);
 #define AT(x) (*(const four *)(x))
 
 /* out = the last `count` of four entries from x on, zero for the others. */
-static inline __attribute__((always_inline)) void keep_last(four *out, const double *x, int count)
+UZ_INLINE void keep_last(four *out, const double *x, int count)
 {
     const lanes place = {0, 1, 2, 3}, kept = place >= 4 - count;
     *out = (four)((lanes)AT(x) & kept);
@@ -38,7 +38,7 @@ static inline __attribute__((always_inline)) void keep_last(four *out, const dou
 
 /* The columns of a strip are neighbours in memory, so the next strip's lines are found from this one's. They come into
  * the second cache only: a processor has few lines on their way to the first one, more to the second. */
-static inline __attribute__((always_inline)) void fetch(const double *entry, int64_t ahead)
+UZ_INLINE void fetch(const double *entry, int64_t ahead)
 {
     __builtin_prefetch((const void *)((uintptr_t)entry + (uintptr_t)(ahead * (int64_t)sizeof(double))), 0, 2);
 }
@@ -50,21 +50,21 @@ typedef struct {
     int edge;
 } layout;
 
-static inline __attribute__((always_inline)) layout layout_of(const panel_of *s, int64_t columns)
+UZ_INLINE layout layout_of(const panel_of *s, int64_t columns)
 {
     const int edge = (int)((s->rows - columns) % 4);
     return (layout){columns, columns + edge, edge};
 }
 
 /* The group at the edge would begin before the supernode: only where it has less than four columns. */
-static inline __attribute__((always_inline)) bool is_tiny(layout at)
+UZ_INLINE bool is_tiny(layout at)
 {
     return at.edge > 0 && at.whole < 4;
 }
 
 /* b_i.. -= L x on the groups of rows from `from` to before `to`, for `width` columns L. */
-static inline __attribute__((always_inline)) void eliminate_rows(const panel_of *s, const double *L, int width,
-                                                                 const double x[PANEL], int64_t from, int64_t to)
+UZ_INLINE void eliminate_rows(const panel_of *s, const double *L, int width, const double x[PANEL], int64_t from,
+                              int64_t to)
 {
     const int64_t rows = s->rows;
     int64_t i = from;
@@ -92,8 +92,7 @@ static inline __attribute__((always_inline)) void eliminate_rows(const panel_of 
  * begins with, so where supernodes are small the steps between count: no group of rows is loaded that was stored in
  * parts. (Products with reciprocals would not wait for divisions, but their second rounding costs answers: of matrices
  * conditioned as 1e13 some can't be certified then.) */
-static inline __attribute__((always_inline)) void eliminate_strip(four *edge, const panel_of *s, int64_t j, int width,
-                                                                  layout at)
+UZ_INLINE void eliminate_strip(four *edge, const panel_of *s, int64_t j, int width, layout at)
 {
     const double *L = s->L + j * s->rows;
     double x[PANEL] = {0};
@@ -114,8 +113,7 @@ static inline __attribute__((always_inline)) void eliminate_strip(four *edge, co
 }
 
 /* sum += L'b over the groups of rows from `from` to before `to`, the last ones first. */
-static inline __attribute__((always_inline)) void add_rows(four sum[PANEL], const panel_of *s, const double *L,
-                                                           int width, int64_t from, int64_t to)
+UZ_INLINE void add_rows(four sum[PANEL], const panel_of *s, const double *L, int width, int64_t from, int64_t to)
 {
     const int64_t rows = s->rows;
     four other[PANEL] = {{0}}; /* two sums, that an addition need not wait for the one before */
@@ -136,7 +134,7 @@ static inline __attribute__((always_inline)) void add_rows(four sum[PANEL], cons
 }
 
 /* The sum of the lanes of each. */
-static inline __attribute__((always_inline)) void add_lanes(double total[PANEL], const four sum[PANEL])
+UZ_INLINE void add_lanes(double total[PANEL], const four sum[PANEL])
 {
     const four a = __builtin_shufflevector(sum[0], sum[1], 0, 4, 2, 6) +
                    __builtin_shufflevector(sum[0], sum[1], 1, 5, 3, 7),
@@ -146,8 +144,7 @@ static inline __attribute__((always_inline)) void add_lanes(double total[PANEL],
 }
 
 /* b_j.. = L_jj'^-1 (b_j.. - L'b), the rows below being known. Those next to the strip were known last. */
-static inline __attribute__((always_inline)) void substitute_strip(const four *edge, const panel_of *s, int64_t j,
-                                                                   int width, layout at)
+UZ_INLINE void substitute_strip(const four *edge, const panel_of *s, int64_t j, int width, layout at)
 {
     const double *L = s->L + j * s->rows;
     double total[PANEL], x[PANEL] = {0};
@@ -172,7 +169,7 @@ static inline __attribute__((always_inline)) void substitute_strip(const four *e
 }
 
 /* Up to three columns are left over by the strips of four. */
-static inline __attribute__((always_inline)) void eliminate_rest(const panel_of *s, int64_t j)
+UZ_INLINE void eliminate_rest(const panel_of *s, int64_t j)
 {
     const layout at = layout_of(s, s->cols);
     four edge = at.edge ? AT(s->b + at.whole - 4) : (four){0};
@@ -191,7 +188,7 @@ static inline __attribute__((always_inline)) void eliminate_rest(const panel_of 
         s->b[at.whole - 4 + k] = edge[k];
 }
 
-static inline __attribute__((always_inline)) void substitute_rest(const panel_of *s, int64_t j)
+UZ_INLINE void substitute_rest(const panel_of *s, int64_t j)
 {
     const layout at = layout_of(s, s->cols);
     four edge = {0};
@@ -228,7 +225,7 @@ static void substitute_tiny(const panel_of *s)
     }
 }
 
-static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
+UZ_INLINE void eliminate(const panel_of *s)
 {
     const layout at = layout_of(s, s->cols - s->cols % PANEL);
     if (is_tiny(layout_of(s, s->cols))) {
@@ -244,7 +241,7 @@ static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
         eliminate_rest(s, at.columns);
 }
 
-static inline __attribute__((always_inline)) void substitute_back(const panel_of *s)
+UZ_INLINE void substitute_back(const panel_of *s)
 {
     const layout at = layout_of(s, s->cols - s->cols % PANEL);
     if (is_tiny(layout_of(s, s->cols))) {

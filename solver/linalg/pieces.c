@@ -1,6 +1,7 @@
 #include "linalg/pieces.h"
 
 #include "core/aside.h"
+#include "core/cpu.h"
 #include "linalg/blas.h"
 
 #include <math.h>
@@ -207,7 +208,7 @@ double uz_long_dot_single(int64_t n, const float *x, const float *y)
 }
 
 /* The largest |x_j|, or |x_j y_j|: comparisons that do not wait for the one before. */
-static inline __attribute__((always_inline)) double largest(const double *x, const double *y, int64_t n)
+UZ_INLINE double largest(const double *x, const double *y, int64_t n)
 {
     enum { APART = 8 };
     double most[APART] = {0.0}, all = 0.0;
