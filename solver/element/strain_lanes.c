@@ -328,84 +328,34 @@ UZ_INLINE void green_strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz
         take_volume(strain, own, rule);
 }
 
-UZ_INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
-{
-    if (rule->dim == 2)
-        shape_of(shape, rule, x, thickness, 2);
-    else
-        shape_of(shape, rule, x, thickness, 3);
-}
-
-UZ_INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
-{
-    if (rule->dim == 2)
-        strains_of(strain, rule, shape, material, u, 2);
-    else
-        strains_of(strain, rule, shape, material, u, 3);
-}
-
-UZ_INLINE void gradients_in_space(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                                  const uz_lanes *u)
-{
-    if (rule->dim == 2)
-        gradients_of(H, rule, shape, u, 2);
-    else
-        gradients_of(H, rule, shape, u, 3);
-}
-
-UZ_INLINE void green_strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                      const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
-{
-    if (rule->dim == 2)
-        green_strains_of(strain, rule, shape, u, by_volume, 2);
-    else
-        green_strains_of(strain, rule, shape, u, by_volume, 3);
-}
-
-UZ_AVX2_FMA static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x,
-                                    double thickness)
-{
-    shape_in_space(shape, rule, x, thickness);
-}
-
-UZ_AVX2_FMA static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
-{
-    strains_in_space(strain, rule, shape, material, u);
-}
-
-UZ_AVX2_FMA static void gradients_fused(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                                        const uz_lanes *u)
-{
-    gradients_in_space(H, rule, shape, u);
-}
-
-UZ_AVX2_FMA static void green_strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                                            const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
-{
-    green_strains_in_space(strain, rule, shape, u, by_volume);
-}
-
-void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
-{
-    (uz_cpu_has_avx2_fma() ? shape_fused : shape_in_space)(shape, rule, x, thickness);
-}
-
-void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                     const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
-{
-    (uz_cpu_has_avx2_fma() ? strains_fused : strains_in_space)(strain, rule, shape, material, u);
-}
-
-void uz_lane_green_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                           const uz_lane_shape *shape, const uz_lanes *u, bool by_volume)
-{
-    (uz_cpu_has_avx2_fma() ? green_strains_fused : green_strains_in_space)(strain, rule, shape, u, by_volume);
-}
-
-void uz_lane_gradients(uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                       const uz_lanes *u)
-{
-    (uz_cpu_has_avx2_fma() ? gradients_fused : gradients_in_space)(H, rule, shape, u);
-}
+/* NAME is KERNEL, for the rule's number of dimensions and for the processor. */
+#define FOR_ALL(NAME, KERNEL, PARAMETERS, ...)                                                                         \
+    UZ_INLINE void KERNEL##_in_space PARAMETERS                                                                        \
+    {                                                                                                                  \
+        if (rule->dim == 2)                                                                                            \
+            KERNEL(__VA_ARGS__, 2);                                                                                    \
+        else                                                                                                           \
+            KERNEL(__VA_ARGS__, 3);                                                                                    \
+    }                                                                                                                  \
+    UZ_AVX2_FMA static void KERNEL##_fused PARAMETERS                                                                  \
+    {                                                                                                                  \
+        KERNEL##_in_space(__VA_ARGS__);                                                                                \
+    }                                                                                                                  \
+    void NAME PARAMETERS                                                                                               \
+    {                                                                                                                  \
+        (uz_cpu_has_avx2_fma() ? KERNEL##_fused : KERNEL##_in_space)(__VA_ARGS__);                                     \
+    }
+FOR_ALL(uz_lane_shape_of, shape_of,
+        (uz_lane_shape * shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness), shape, rule, x,
+        thickness)
+FOR_ALL(uz_lane_strains, strains_of,
+        (uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
+         const uz_lane_material *material, const uz_lanes *u),
+        strain, rule, shape, material, u)
+FOR_ALL(uz_lane_green_strains, green_strains_of,
+        (uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
+         const uz_lanes *u, bool by_volume),
+        strain, rule, shape, u, by_volume)
+FOR_ALL(uz_lane_gradients, gradients_of,
+        (uz_lanes H[UZ_ELEMENT_GAUSS][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u),
+        H, rule, shape, u)

@@ -610,50 +610,20 @@ static bool any(const task *x)
     return evaluate(x, x->rule->dim, (x->rule->nodes + LANES - 1) / LANES, x->rule->model == UZ_AXISYMMETRIC);
 }
 
-UZ_AVX2_FMA static bool four_of_plane(const task *x)
-{
-    return evaluate(x, 2, 1, false);
-}
-
-UZ_AVX2_FMA static bool eight_of_plane(const task *x)
-{
-    return evaluate(x, 2, 2, false);
-}
-
-UZ_AVX2_FMA static bool four_of_ring(const task *x)
-{
-    return evaluate(x, 2, 1, true);
-}
-
-UZ_AVX2_FMA static bool eight_of_ring(const task *x)
-{
-    return evaluate(x, 2, 2, true);
-}
-
-UZ_AVX2_FMA static bool four_of_solid(const task *x)
-{
-    return evaluate(x, 3, 1, false);
-}
-
-UZ_AVX2_FMA static bool eight_of_solid(const task *x)
-{
-    return evaluate(x, 3, 2, false);
-}
-
-UZ_AVX2_FMA static bool twelve_of_solid(const task *x)
-{
-    return evaluate(x, 3, 3, false);
-}
-
-UZ_AVX2_FMA static bool sixteen_of_solid(const task *x)
-{
-    return evaluate(x, 3, 4, false);
-}
-
-UZ_AVX2_FMA static bool twenty_of_solid(const task *x)
-{
-    return evaluate(x, 3, 5, false);
-}
+#define OF_SHAPE(NAME, DIM, WIDE, RING)                                                                                \
+    UZ_AVX2_FMA static bool NAME(const task *x)                                                                        \
+    {                                                                                                                  \
+        return evaluate(x, DIM, WIDE, RING);                                                                           \
+    }
+OF_SHAPE(four_of_plane, 2, 1, false)
+OF_SHAPE(eight_of_plane, 2, 2, false)
+OF_SHAPE(four_of_ring, 2, 1, true)
+OF_SHAPE(eight_of_ring, 2, 2, true)
+OF_SHAPE(four_of_solid, 3, 1, false)
+OF_SHAPE(eight_of_solid, 3, 2, false)
+OF_SHAPE(twelve_of_solid, 3, 3, false)
+OF_SHAPE(sixteen_of_solid, 3, 4, false)
+OF_SHAPE(twenty_of_solid, 3, 5, false)
 
 bool uz_finite_element(uz_finite_forces *out, double *ke, bool forces, const uz_finite_rule *rule,
                        const uz_element *element, uz_elasticity law, const double *u, const double *step)
