@@ -61,10 +61,8 @@ static uz_status begin(weighing *y, int64_t n_dofs, uz_error *err)
 
 static void end(weighing *y)
 {
-    void *room[] = {y->scratch.residual, y->x.resultant, y->x.pressure, y->x.lift, y->x.moved,     y->x.gap, y->acts[0],
-                    y->acts[1],          y->v,           y->tractions,  y->force,  y->free_strain, y->limit};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(y->scratch.residual, y->x.resultant, y->x.pressure, y->x.lift, y->x.moved, y->x.gap, y->acts[0],
+                y->acts[1], y->v, y->tractions, y->force, y->free_strain, y->limit);
 }
 
 /* ---- sums over elements */

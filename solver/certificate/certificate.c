@@ -328,9 +328,7 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
             *out = before;
         }
     }
-    double *room[] = {c.res.e, c.res.e_u, c.res.Ku, c.res.Kc, c.weight, c.weight_b, c.u_b, c.c, kept};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(c.res.e, c.res.e_u, c.res.Ku, c.res.Kc, c.weight, c.weight_b, c.u_b, c.c, kept);
     uz_csc_clear(&c.Nt);
     free(c.dof);
     uz_feasible_clear(&c.feasible);

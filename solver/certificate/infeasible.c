@@ -305,9 +305,7 @@ uz_status uz_prove_ray(double *radius, double *y, const uz_csc *N, const double 
     } else if (status == UZ_OK) {
         *radius = radius_of(y, N, h);
     }
-    void *room[] = {x.row, x.pivot, x.shift, x.dof, x.place, x.seen, x.used, exact};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x.row, x.pivot, x.shift, x.dof, x.place, x.seen, x.used, exact);
     uz_csc_clear(&Nt);
     return status;
 }

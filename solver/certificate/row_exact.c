@@ -280,8 +280,6 @@ bool uz_row_exact_solve(const uz_row_exact *problem)
         }
     }
     uz_row_factor_clear(&x.f);
-    void *room[] = {x.least, x.g, x.slack, x.t, x.list, x.barred};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x.least, x.g, x.slack, x.t, x.list, x.barred);
     return found;
 }

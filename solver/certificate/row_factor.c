@@ -51,10 +51,8 @@ void uz_row_factor_clear(uz_row_factor *f)
 {
     for (int64_t k = 0; f->column && f->Nt && k < f->Nt->cols; k++)
         free(f->column[k].below);
-    void *room[] = {f->column, f->row,  f->place, f->l_place, f->stack, f->at, f->seen,
-                    f->marked, f->left, f->size,  f->w,       f->l,     f->x};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(f->column, f->row, f->place, f->l_place, f->stack, f->at, f->seen, f->marked, f->left, f->size, f->w,
+                f->l, f->x);
     uz_csc_clear(&f->N);
     memset(f, 0, sizeof *f);
 }

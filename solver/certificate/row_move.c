@@ -31,9 +31,7 @@ bool uz_row_move_init(uz_row_move *move, int64_t d, int64_t m)
 
 void uz_row_move_clear(uz_row_move *move)
 {
-    double *room[] = {move->target, move->x, move->residual, move->direction, move->image, move->scale, move->dofs};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(move->target, move->x, move->residual, move->direction, move->image, move->scale, move->dofs);
     free(move->in);
     memset(move, 0, sizeof *move);
 }

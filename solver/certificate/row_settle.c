@@ -360,9 +360,7 @@ bool uz_row_settle_solve(uz_row_settle *problem)
     }
     if (settled && n > 0)
         settled = move_rows(&s, wrong, n);
-    void *room[] = {wrong, s.sure, s.delta, s.moved, s.near, s.list};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(wrong, s.sure, s.delta, s.moved, s.near, s.list);
     uz_csc_clear(&s.N);
     return settled;
 }

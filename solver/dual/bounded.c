@@ -495,9 +495,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     box->swept_bytes = 12 * (size_t)K->cols + (room ? 40 * (size_t)near.n + 16 * (size_t)near.ptr[near.n] : 0);
     for (int64_t a = 0; room && a < near.n; a++)
         box->point[near.dof[a]] = near.u[a];
-    void *own[] = {near.links, near.place, near.dof, near.ptr, near.idx, near.val, near.inverse, near.pull, near.u};
-    for (size_t k = 0; k < sizeof own / sizeof own[0]; k++)
-        free(own[k]);
+    uz_free_all(near.links, near.place, near.dof, near.ptr, near.idx, near.val, near.inverse, near.pull, near.u);
     box->point_energy = energy(box, K, box->point);
     memset(active, 0, (size_t)load->dual->m * sizeof *active);
     for (int64_t b = 0; b < box->n; b++) {

@@ -222,9 +222,7 @@ uz_status uz_dual_load_interior(uz_dual_load *load, bool *can, bool *active, dou
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld reactions", (long long)x.m);
     for (int64_t i = 0; status == UZ_OK && *can && i < x.m; i++)
         load->inside[i] = active[i] ? -x.z[i] : 0.0;
-    double *room[] = {x.compliance, x.unit, x.sigma, x.s, x.z, x.ds, x.dz, x.aim, x.gap, x.w, x.dw, x.force, x.room};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x.compliance, x.unit, x.sigma, x.s, x.z, x.ds, x.dz, x.aim, x.gap, x.w, x.dw, x.force, x.room);
     uz_factor_free(x.factor);
     uz_factor_workspace_free(x.ws);
     uz_springs_clear(&x.springs);

@@ -116,15 +116,11 @@ uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
 void uz_sparse_unload(uz_sparse_load *x)
 {
     uz_bounded *box = x->box;
-    void *room[] = {x->p, x->base, x->response, x->work, x->work2};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x->p, x->base, x->response, x->work, x->work2);
     if (!box)
         return;
-    void *of_box[] = {box->dof, box->top,   box->bottom, box->u,      box->size, box->point,
-                      box->r,   box->upper, box->lower,  box->holder, box->fixed};
-    for (size_t k = 0; k < sizeof of_box / sizeof of_box[0]; k++)
-        free(of_box[k]);
+    uz_free_all(box->dof, box->top, box->bottom, box->u, box->size, box->point, box->r, box->upper, box->lower,
+                box->holder, box->fixed);
     free(box);
 }
 

@@ -153,10 +153,8 @@ void uz_paths_free(uz_paths *x)
         return;
     reset(x);
     cholmod_l_free_sparse(&x->K, &x->ws->common);
-    void *room[] = {x->parent, x->first, x->links, x->work, x->changed, x->held,
-                    x->block,  x->idle,  x->local, x->room, x->x};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x->parent, x->first, x->links, x->work, x->changed, x->held, x->block, x->idle, x->local, x->room,
+                x->x);
     free(x);
 }
 

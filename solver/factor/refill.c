@@ -59,9 +59,7 @@ void uz_refill_free(uz_refill *x)
         cholmod_l_free_sparse(&x->K, &common);
         cholmod_l_finish(&common);
     }
-    void *room[] = {x->place, x->owner, x->next, x->from};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x->place, x->owner, x->next, x->from);
     for (int k = 0; k < UZ_SHARES; k++) {
         free(x->of[k].head);
         if (k != UZ_REST)

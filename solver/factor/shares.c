@@ -123,9 +123,7 @@ unsigned char *uz_share_tree(const cholmod_factor *L)
     }
     if (ok)
         cut(share, &t, count);
-    void *room[] = {owner, t.parent, t.child, t.next, t.work, ok ? NULL : share};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(owner, t.parent, t.child, t.next, t.work, ok ? NULL : share);
     return ok ? share : NULL;
 }
 

@@ -284,9 +284,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
 done:
     if (status == UZ_OK && p.before > 0 && !over && *end != UZ_END_SOLVED && *end != UZ_END_TARGET)
         status = bound_last(it, load, err);
-    void *room[] = {p.active, p.held, p.refuted, p.r, p.g};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(p.active, p.held, p.refuted, p.r, p.g);
     return status;
 }
 

@@ -86,10 +86,8 @@ static uz_status grow(uz_exchange *x, uz_error *err)
         memcpy(w, x->w, n * sizeof *w);
         memcpy(chunk, x->chunk, (size_t)(x->room / CHUNK + 1) * sizeof *chunk);
     }
-    void *unused[] = {ok ? (void *)x->rows : rows,   ok ? (void *)x->place : place, ok ? x->L : L, ok ? x->l : l,
-                      ok ? (void *)x->chunk : chunk, ok ? x->by_place : by_place,   ok ? x->w : w};
-    for (size_t k = 0; k < sizeof unused / sizeof unused[0]; k++)
-        free(unused[k]);
+    uz_free_all(ok ? (void *)x->rows : rows, ok ? (void *)x->place : place, ok ? x->L : L, ok ? x->l : l,
+                ok ? (void *)x->chunk : chunk, ok ? x->by_place : by_place, ok ? x->w : w);
     if (ok) {
         x->rows = rows;
         x->place = place;
@@ -109,10 +107,8 @@ void uz_exchange_free(uz_exchange *x)
         return;
     for (int64_t k = 0; x->chunk && k <= x->room / CHUNK; k++)
         free(x->chunk[k]);
-    void *room[] = {x->rows, x->place, x->chunk, x->L,    x->l,        x->w,    x->by_place, x->s,
-                    x->g,    x->depth, x->size,  x->open, x->incoming, x->base, x->barred,   x->asked};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x->rows, x->place, x->chunk, x->L, x->l, x->w, x->by_place, x->s, x->g, x->depth, x->size, x->open,
+                x->incoming, x->base, x->barred, x->asked);
     free(x);
 }
 

@@ -44,10 +44,8 @@ uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, const uz_dual *dual
 
 void uz_iterate_clear(uz_iterate *it)
 {
-    double *vectors[] = {it->r,     it->Dr,     it->r_next, it->Dr_next, it->rho,      it->Drho,
-                         it->gamma, it->best_r, it->anchor, it->ray,     it->before.r, it->step};
-    for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
-        free(vectors[k]);
+    uz_free_all(it->r, it->Dr, it->r_next, it->Dr_next, it->rho, it->Drho, it->gamma, it->best_r, it->anchor, it->ray,
+                it->before.r, it->step);
     free(it->close);
     memset(it, 0, sizeof *it);
 }

@@ -288,10 +288,8 @@ void uz_surface_clear(uz_surface *s)
 {
     if (!s)
         return;
-    void *const blocks[] = {s->position,   s->displacement, s->node,        s->von_mises.x, s->triangle,   s->line,
-                            s->outline,    s->row_vertex,   s->row_contact, s->row_normal,  s->reaction.x, s->gap.x,
-                            s->pressure.x, s->arc.x,        s->row_part,    s->touch.x};
-    for (size_t i = 0; i < sizeof blocks / sizeof blocks[0]; i++)
-        free(blocks[i]);
+    uz_free_all(s->position, s->displacement, s->node, s->von_mises.x, s->triangle, s->line, s->outline, s->row_vertex,
+                s->row_contact, s->row_normal, s->reaction.x, s->gap.x, s->pressure.x, s->arc.x, s->row_part,
+                s->touch.x);
     memset(s, 0, sizeof *s);
 }

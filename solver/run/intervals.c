@@ -309,9 +309,7 @@ static uz_status begin_own(rows_problem *x, const contact_rows *own, const uz_gu
 
 static void end_rows(rows_problem *x, uz_cache *cache)
 {
-    void *room[] = {x->p, x->load, x->x, x->y, x->r, x->target, x->width, x->h, x->reaction, x->gap, x->state, x->held};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x->p, x->load, x->x, x->y, x->r, x->target, x->width, x->h, x->reaction, x->gap, x->state, x->held);
     uz_setup_release(cache, x->setup);
 }
 
@@ -963,10 +961,7 @@ uz_status uz_prove_quantities(uz_result *result, const uz_guaranteed *g, uz_erro
     end_contact_rows(&v.own, g->cache);
     if (v.share && e->asked > 0)
         uz_add_share(e, g->body.model->mesh.n_elements, v.share);
-    void *room[] = {
-        v.share,        v.open, v.w, v.best_w, v.stress, v.best_stress, v.wanted, v.adjoint.edge, v.adjoint.before.at,
-        v.adjoint.force};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(v.share, v.open, v.w, v.best_w, v.stress, v.best_stress, v.wanted, v.adjoint.edge, v.adjoint.before.at,
+                v.adjoint.force);
     return status;
 }

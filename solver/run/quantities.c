@@ -584,9 +584,7 @@ uz_status uz_find_quantities(uz_result *answer, const uz_quantity_work *work, uz
         e->n_quantities = i + 1;
     }
     e->asked = work->settings->quantity_error;
-    void *room[] = {x.least[0], x.least[1], x.p, x.h,           x.y,      x.g,      x.of_rows,  x.depth,      x.bulge,
-                    x.slip,     x.z,        x.w, x.free_strain, x.active, x.row_of, x.pressing, x.of_elements};
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        free(room[k]);
+    uz_free_all(x.least[0], x.least[1], x.p, x.h, x.y, x.g, x.of_rows, x.depth, x.bulge, x.slip, x.z, x.w,
+                x.free_strain, x.active, x.row_of, x.pressing, x.of_elements);
     return status;
 }

@@ -190,9 +190,7 @@ uz_status uz_prove_contact(uz_contact_verdict *verdict, bool *provable, const uz
         uz_contact_verdict of_row = prove_row(&x, &provable[i], i);
         *verdict = of_row > *verdict ? of_row : *verdict;
     }
-    void *room[] = {x.open, x.dof, x.row, x.z, x.Kz, x.image, x.force};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
+    uz_free_all(x.open, x.dof, x.row, x.z, x.Kz, x.image, x.force);
     uz_row_move_clear(&x.move);
     return status;
 }

@@ -255,9 +255,7 @@ uz_status uz_null_space(double **Z, int64_t *k, const uz_csc *K, const uz_csc *K
         *Z = NULL;
         b = b < s.m ? b : s.m; /* N'R N has no larger rank */
         status = search(&s, Z, k, b, err);
-        void *room[] = {s.X, s.Y, s.B, s.pivot, s.row, s.dof};
-        for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-            free(room[i]);
+        uz_free_all(s.X, s.Y, s.B, s.pivot, s.row, s.dof);
         s.X = s.Y = s.B = s.row = s.dof = NULL;
         s.pivot = NULL;
         if (*k < b || b == s.m || b > UZ_NULL_MOST)
