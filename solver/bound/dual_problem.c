@@ -536,7 +536,7 @@ uz_status uz_bound_stress(double *stress, const uz_bound_body *body, const int64
     int64_t *order = order_of(body);
     if (!kept || !order) {
         uz_free_all(kept, order);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress of an element");
+        return uz_no_memory(err, "the stress of an element");
     }
     memset(stress, 0, (size_t)n * UZ_BOUND_PARTS * UZ_BOUND_POINTS * 3 * sizeof *stress);
     for (int64_t k = 0; k < n && status == UZ_OK; k++) {

@@ -536,9 +536,7 @@ static uz_status begin_interval(weighing *y, uz_bound_interval *out, int64_t n_d
     *out = (uz_bound_interval){.share = y->pair->share};
     out->local = uz_alloc(y->body->model->mesh.n_elements, sizeof *out->local);
     const uz_status status = begin(y, n_dofs, err);
-    return status == UZ_OK && !out->local
-               ? uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what elements have of an interval")
-               : status;
+    return status == UZ_OK && !out->local ? uz_no_memory(err, "what elements have of an interval") : status;
 }
 
 uz_status uz_bound_width(uz_bound_interval *out, const uz_bound_pair *pair, const uz_bound_body *body,

@@ -34,8 +34,7 @@ uz_status uz_pattern_digest(char digest[65], const uz_csc *A, uz_error *err)
         uz_digest_add(pattern, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
         uz_digest_add(pattern, A->idx, (size_t)A->ptr[A->cols] * sizeof *A->idx);
     }
-    return pattern && uz_digest_end(pattern, digest) ? UZ_OK
-                                                     : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+    return pattern && uz_digest_end(pattern, digest) ? UZ_OK : uz_no_memory(err, "a digest");
 }
 
 uz_status uz_matrix_digest(uz_matrix_key *key, uz_cache *cache, const uz_csc *A, uz_error *err)
@@ -50,7 +49,7 @@ uz_status uz_matrix_digest(uz_matrix_key *key, uz_cache *cache, const uz_csc *A,
     }
     if (status != UZ_OK || (values && uz_digest_end(values, key->values)))
         return status;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest of a matrix");
+    return uz_no_memory(err, "a digest of a matrix");
 }
 
 /* The key of an object that `first` (a digest), the ordering and the contact determine. */
@@ -59,7 +58,7 @@ static uz_status digest_with_order(char digest[65], const char *first, const wan
     uz_digest *state = uz_digest_new();
     int ordering = (int)w->ordering;
     if (!state)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+        return uz_no_memory(err, "a digest");
     uz_digest_add(state, first, 64);
     uz_digest_add(state, &ordering, sizeof ordering);
     uz_digest_add(state, w->dofs, (size_t)w->n_dofs * sizeof *w->dofs);
@@ -124,7 +123,7 @@ static uz_status keep(uz_cache *cache, uz_item *item, uz_factor *factor, const w
     kept_factor *kept = uz_alloc_zero(1, sizeof *kept);
     if (!kept) {
         uz_factor_free(factor);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
+        return uz_no_memory(err, "a cache entry");
     }
     kept->factor = factor;
     kept->ordering = w->ordering;

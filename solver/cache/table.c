@@ -155,7 +155,7 @@ uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_ite
     if (found) {
         use(cache, found);
     } else if (!(found = uz_alloc_zero(1, sizeof *found))) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
+        status = uz_no_memory(err, "a cache entry");
     } else {
         found->kind = kind;
         memcpy(found->digest, digest, sizeof found->digest);

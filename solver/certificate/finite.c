@@ -696,7 +696,7 @@ static uz_status look_at_contacts(uz_finite_certificate *out, work *w, uz_error 
     const int64_t n = of->scene->n_contacts;
     uz_obstacle **obstacle = uz_alloc_zero(n, sizeof *obstacle);
     double *apart = uz_alloc(of->model->mesh.n_nodes, sizeof *apart);
-    uz_status status = obstacle && apart ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the obstacles");
+    uz_status status = obstacle && apart ? UZ_OK : uz_no_memory(err, "the obstacles");
     for (int64_t k = 0; k < n && status == UZ_OK; k++) {
         if (of->scene->contacts[k].kind == UZ_OBSTACLE_BODY) {
             status = uz_pair_gaps(&out->least_gap, &out->least_part, of->model, of->scene, k, of->u, SAMPLES + 1, err);

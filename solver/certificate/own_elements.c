@@ -23,7 +23,7 @@ static uz_status find_same(bool *same, const uz_body_model *model, const uz_grou
     bool *has = status == UZ_OK ? uz_alloc_zero(parts.count, sizeof *has) : NULL;
     *same = false;
     if (status == UZ_OK && !has)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a contact");
+        status = uz_no_memory(err, "the parts of a contact");
     for (int j = 0; j < 2; j++)
         for (int64_t i = 0; i < group[j]->n_faces && status == UZ_OK; i++) {
             bool *of = &has[parts.of[mesh->node[mesh->first[group[j]->face[i].element]]]];
@@ -49,7 +49,7 @@ uz_status uz_own_elements_init(uz_own_elements *out, const uz_body_model *model,
     out->box = uz_alloc(2 * dim * mesh->n_elements, sizeof *out->box);
     out->near = uz_alloc(mesh->n_elements, sizeof *out->near);
     if (!out->xyz || !out->box || !out->near)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body that touches itself");
+        return uz_no_memory(err, "a body that touches itself");
     for (int64_t i = 0; i < dim * mesh->n_nodes; i++)
         out->xyz[i] = mesh->xyz[i] + u[i];
     for (int64_t e = 0; e < mesh->n_elements; e++) {

@@ -316,5 +316,5 @@ uz_status uz_pair_gaps_space(double *least, double *part, const uz_body_model *m
                               own);
         }
     uz_free_all(sheets[0], sheets[1]);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surfaces of a contact");
+    return room ? UZ_OK : uz_no_memory(err, "the surfaces of a contact");
 }

@@ -97,7 +97,7 @@ static uz_status find(point_at *x, const uz_finite_answer *of, const uz_load *lo
     x->share = uz_alloc_zero(mesh->n_nodes, sizeof *x->share);
     x->r = uz_alloc_zero(3 * mesh->n_nodes, sizeof *x->r);
     if (!x->share || !x->r)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
+        return uz_no_memory(err, "a force at a point");
     const uz_status status = uz_spread_over_group(x->share, of->model, group, false, "/loads", err);
     if (status != UZ_OK)
         return status;
@@ -185,7 +185,7 @@ static uz_status add(double *f, uz_body_model *tangent, const uz_finite_answer *
     uz_status status = find(&x, of, load, err);
     double *C = uz_alloc(dim * dim * model->d, sizeof *C), *room = uz_alloc(dim * n, sizeof *room);
     if (status == UZ_OK && (!C || !room))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
+        status = uz_no_memory(err, "a force at a point");
     for (int p = 0; p < dim * dim && status == UZ_OK; p++) {
         for (int64_t i = 0; i < dim * n; i++)
             room[i] = i % dim == p / dim ? (double)(x.share[i / dim] * x.r[3 * (i / dim) + p % dim]) : 0;

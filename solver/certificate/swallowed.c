@@ -114,7 +114,7 @@ uz_status uz_swallows(bool *inside, const uz_body_model *model, const uz_scene *
     uz_status status = uz_find_parts(&parts, model, err);
     bool *touches = status == UZ_OK ? uz_alloc_zero(parts.count, sizeof *touches) : NULL;
     if (status == UZ_OK && !touches)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a contact");
+        status = uz_no_memory(err, "the parts of a contact");
     for (int64_t i = 0; status == UZ_OK && i < uz_group_node_count(mesh, group); i++)
         touches[parts.of[uz_group_node_at(group, i)]] = true;
     for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements && !*inside; e++)

@@ -67,7 +67,7 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, uz_error
     const int64_t d = dual->d, m = dual->m;
     uz_bounded *box = x->box = uz_alloc_zero(1, sizeof *box);
     if (!box)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
+        return uz_no_memory(err, "a load");
     box->bounds = bounds;
     bool ok = list_dofs(box, dual);
     double **room[] = {&box->top, &box->bottom, &box->u, &box->size};

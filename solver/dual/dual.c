@@ -72,7 +72,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
     *out = NULL;
     uz_dual *dual = uz_alloc_zero(1, form->dual_size);
     if (!dual)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+        return uz_no_memory(err, "the dual operator");
     dual->form = form;
     dual->can = &form->can;
     dual->d = N->cols;
@@ -88,7 +88,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
         pthread_mutex_init(&dual->lazy->known, NULL);
         dual->lazy->lambda_max[0] = dual->lazy->lambda_max[1] = NAN;
     } else {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+        status = uz_no_memory(err, "the dual operator");
     }
     if (status == UZ_OK)
         status = take_rows(dual, source, err);
@@ -147,7 +147,7 @@ uz_status uz_dual_load_near(uz_dual_load **out, const uz_dual *dual, const uz_cs
     uz_status status = UZ_OK;
     uz_dual_load *load = uz_alloc_zero(1, dual->form->load_size);
     if (!load)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
+        return uz_no_memory(err, "a load");
     load->dual = dual;
     load->K = K;
     load->stop.deadline = INFINITY;

@@ -57,7 +57,7 @@ uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err)
     free(ws->panel);
     ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
     ws->panel_size = ws->panel ? need : 0;
-    return ws->panel ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution");
+    return ws->panel ? UZ_OK : uz_no_memory(err, "a substitution");
 }
 
 /* The elimination tree of several unconnected bodies is a forest and its postorder may put one body's contact dofs

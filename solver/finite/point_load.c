@@ -120,7 +120,7 @@ static uz_status find_point(point_at *x, const uz_body_model *model, const uz_sc
     x->share = uz_alloc_zero(mesh->n_nodes, sizeof *x->share);
     x->r = uz_alloc_zero(3 * mesh->n_nodes, sizeof *x->r);
     if (!x->share || !x->r)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
+        return uz_no_memory(err, "a force at a point");
     const uz_status status = uz_spread_over_group(x->share, model, group, false, where, err);
     if (status != UZ_OK)
         return status;
@@ -233,7 +233,7 @@ uz_status uz_point_tangent(uz_body_model *tangent, const uz_scene *scene, int64_
     const int rank = 2 * x.turns;
     double *C = uz_alloc(rank * d, sizeof *C), *room = uz_alloc(n, sizeof *room);
     if (status == UZ_OK && (!C || !room))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force at a point");
+        status = uz_no_memory(err, "a force at a point");
     if (status == UZ_OK)
         invert_second(Z, &x);
     for (int k = 0; k < rank && status == UZ_OK; k++)

@@ -139,7 +139,7 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
     const double *scale = load->dual->row_scale;
     uz_state *s = uz_alloc_zero(1, sizeof *s);
     if (!s)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
+        return uz_no_memory(err, "a state");
     s->r = uz_alloc(it->m, sizeof *s->r);
     s->rho = uz_alloc(it->m, sizeof *s->rho);
     s->Dr = uz_alloc(it->m, sizeof *s->Dr);

@@ -69,7 +69,7 @@ uz_status uz_candidates_reduce(uz_csc *out, const uz_csc *N, const uz_candidates
     int64_t *number = uz_alloc(candidates->m, sizeof *number);
     memset(out, 0, sizeof *out);
     if (!number)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact candidates");
+        return uz_no_memory(err, "contact candidates");
     for (int64_t i = 0; i < candidates->m; i++)
         number[i] = candidates->in[i] ? row++ : -1;
     for (int64_t q = 0; q < N->ptr[N->cols]; q++)

@@ -70,7 +70,7 @@ static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
     static const double FLAT[4] = {1, 0, 1, 0};
     o->own = uz_alloc_zero(1, o->dim == 2 ? sizeof(uz_line) : sizeof(uz_table));
     if (!o->own)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
+        return uz_no_memory(err, "an obstacle");
     return o->dim == 2 ? uz_line_init(o->own, c->n_x, c->x, c->z, FLAT, o->scale, err)
                        : uz_table_init(o->own, c, o->scale, err);
 }

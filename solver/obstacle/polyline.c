@@ -37,7 +37,7 @@ static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
     int64_t pair[2];
     uz_line *line = o->own = uz_alloc_zero(1, sizeof *line);
     if (!line)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
+        return uz_no_memory(err, "an obstacle");
     const uz_status status = uz_line_init(line, c->n_x, c->x, c->y, NULL, o->scale, err);
     if (status != UZ_OK || !uz_line_crosses(pair, line))
         return status;

@@ -166,7 +166,7 @@ static uz_status cut_all(section *w, size_t most_bytes, const uz_hooks *hooks, u
         if (is_missed(w, node, count))
             continue;
         if (!cut_element(w, uz_element_type_of((uz_element_kind)mesh->kind[e]), node))
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a section");
+            return uz_no_memory(err, "a section");
         const double bytes = 4 * (7 * (double)s->n_vertices + 5 * (double)s->n_triangles);
         if (s->n_vertices >= INT32_MAX || (most_bytes > 0 && bytes > (double)most_bytes))
             return uz_fail(err, UZ_ERR_LIMIT, "", "the section would take more than the %.0f MB that may be",
@@ -192,7 +192,7 @@ static uz_status build(section *w, const uz_field_body *body, const uz_field_sou
         s->position = uz_alloc(3 * s->n_vertices, sizeof *s->position);
         s->displacement = uz_alloc(3 * s->n_vertices, sizeof *s->displacement);
         if (!s->position || !s->displacement)
-            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a section");
+            status = uz_no_memory(err, "a section");
     }
     uz_surface_frame(s, &w->model->mesh);
     for (int64_t i = 0; status == UZ_OK && i < s->n_vertices; i++)

@@ -104,7 +104,7 @@ static uz_status add_springs(balance *b, uz_error *err)
         if (support->kind != UZ_SUPPORT_SPRING)
             continue;
         if (!share && !(share = uz_alloc(mesh->n_nodes, sizeof *share))) {
-            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of springs");
+            status = uz_no_memory(err, "the forces of springs");
             break;
         }
         const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);

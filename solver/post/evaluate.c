@@ -28,7 +28,7 @@ static uz_status begin(uz_result *result, const uz_body_model *model, const uz_s
     uz_evaluation *e = uz_alloc_zero(1, sizeof *e);
     result->evaluation = e;
     if (!e)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a summary");
+        return uz_no_memory(err, "a summary");
     e->n_contacts = scene->n_contacts;
     e->n_supports = scene->n_supports;
     e->peak_node = -1;

@@ -288,7 +288,7 @@ uz_status uz_contact_depth(double *depth, double *bulge, const uz_body_model *mo
     memset(depth, 0, (size_t)model->m * sizeof *depth);
     memset(bulge, 0, (size_t)model->m * sizeof *bulge);
     if (!sum || !normal || !presses)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of contacts");
+        status = uz_no_memory(err, "the sides of contacts");
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         const uz_contact *contact = &scene->contacts[k];
         uz_obstacle *obstacle = NULL;
@@ -425,8 +425,8 @@ static uz_status take_reaction(const making *k, uz_error *err)
     bool springs = false, holds = false;
     uz_csc supports = {.ptr = NULL};
     double *share = uz_alloc(n_nodes, sizeof *share);
-    uz_status status = share ? uz_list_held(&supports, &k->model->mesh, scene, err)
-                             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    uz_status status =
+        share ? uz_list_held(&supports, &k->model->mesh, scene, err) : uz_no_memory(err, "the forces of supports");
     for (int64_t a = 0; a < n_nodes && status == UZ_OK; a++)
         take_share(k, &supports, a);
     for (int64_t s = 0; s < scene->n_supports && status == UZ_OK; s++) {

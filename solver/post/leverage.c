@@ -229,7 +229,7 @@ uz_status uz_force_leverage(double *out, const uz_body_model *model, const uz_sc
         free(of[k].node);
     free(of);
     if (!room)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for what holds the body");
+        return uz_no_memory(err, "what holds the body");
     *out = force > 0 ? most * sqrt(2 * e->strain_energy) / force : 0;
     return UZ_OK;
 }

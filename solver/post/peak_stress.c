@@ -70,8 +70,7 @@ uz_status uz_find_peak_stress(uz_evaluation *out, const uz_body_model *model, co
     if (!out->stressed)
         return UZ_OK;
     around *of = uz_alloc(model->mesh.n_nodes, sizeof *of);
-    uz_status status = of ? uz_field_body_init(&body, scene, model, err)
-                          : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the largest stress");
+    uz_status status = of ? uz_field_body_init(&body, scene, model, err) : uz_no_memory(err, "the largest stress");
     const uz_field_source answer = {.u = u, .n_u = model->mesh.n_nodes * model->mesh.dim};
     if (status == UZ_OK)
         status = uz_fields_of_body(&fields, &body, &answer, UZ_FIELD_VON_MISES, NULL, err);

@@ -154,7 +154,7 @@ uz_status uz_field_gauss(double *element, double *point, double *stress, const u
     uz_status status = UZ_OK;
     gauss_plan *plan = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *plan);
     if (!plan)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at Gauss points");
+        return uz_no_memory(err, "the stress at Gauss points");
     for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
         gauss_plan *own = &plan[kind];

@@ -113,7 +113,7 @@ uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz
                      .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row),
                      .pressure = fields.pressure ? uz_alloc(fields.n_nodes, sizeof *w.pressure) : NULL};
         if (!w.room || !w.has_row || (fields.pressure && !w.pressure))
-            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
+            status = uz_no_memory(err, "a vtu file");
         else if (uz_cancelled(hooks))
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the file was written");
         if (status == UZ_OK && w.pressure)

@@ -57,7 +57,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
     *out = NULL;
     uz_block *block = uz_alloc_zero(1, sizeof *block);
     if (!block)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+        return uz_no_memory(err, "a block of loads");
     block->setup = setup;
     block->K = uz_setup_K(setup, problem);
     block->N = uz_setup_N(setup, problem);
@@ -69,7 +69,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
     block->corrected = uz_alloc_zero(block->width, sizeof(bool));
     uz_status status = UZ_OK;
     if (!block->runs || !block->cases || !block->r || !block->corrected)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+        status = uz_no_memory(err, "a block of loads");
     if (status == UZ_OK)
         status = uz_dual_block_create(&block->loads, setup->dual, blocks, err);
     const uz_certify_input in = {.K = block->K,
@@ -80,7 +80,7 @@ uz_status uz_block_create(uz_block **out, uz_run **runs, uz_setup *setup, const 
                                  .inverse_bound = uz_factor_describe(setup->factor).inverse_bound,
                                  .spares = uz_factor_describe(setup->factor).nnz >= UZ_CERTIFY_SPARES};
     if (status == UZ_OK && !in.spares && !(block->permuted = uz_alloc(block->d * UZ_LANES, sizeof(double))))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+        status = uz_no_memory(err, "a block of loads");
     if (status == UZ_OK)
         status = uz_lane_certifier_create(&block->certifier, &in, inverse_norms, err);
     if (status == UZ_OK)
@@ -182,7 +182,7 @@ uz_status uz_block_solve(uz_block *block, const uz_request *asked, int64_t count
     bool *certified = uz_alloc_zero(count, sizeof *certified);
     *failed = 0;
     if (!certified)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+        return uz_no_memory(err, "a block of loads");
     uz_status status = load_all(block, asked, count, failed, err);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
         uz_run *run = &block->runs[k];

@@ -247,7 +247,7 @@ static uz_status begin(uz_finite_run *run, const uz_problem *one, const uz_setti
     const bool copied = copy_lists(&run->scene, &one->scene, run->from);
     run->cache = uz_cache_new(CACHE_BYTES);
     if (!copied || !run->cache)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+        return uz_no_memory(err, "the parts of a load");
     uz_status status = uz_body_model_build(&run->base, &run->scene, UZ_BODY_HELD, err);
     if (status == UZ_OK)
         status = check_ties(&run->base, &run->scene, err);
@@ -397,8 +397,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
     uz_finite *found = &run->found;
     double step = 1;
     const uz_finite_point *from = run->from;
-    uz_status status =
-        last.u && start_at(&last, from) ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+    uz_status status = last.u && start_at(&last, from) ? UZ_OK : uz_no_memory(err, "the parts of a load");
     *why = UZ_PART_SETTLED;
     if (status == UZ_OK && from)
         status = go_back(run, &last, 0, err);
@@ -422,7 +421,7 @@ static uz_status put_on_all(uz_part *why, double *tried, uz_finite_run *run, uz_
             found->least_det = run->certificate.least_det;
             found->most = run->step_qps > found->most ? run->step_qps : found->most;
             step *= run->step_qps <= FEW ? 2 : 1;
-            status = keep(&last, run) ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a load");
+            status = keep(&last, run) ? UZ_OK : uz_no_memory(err, "the parts of a load");
             if (status == UZ_OK && t < 1)
                 status = look_for_passing(run, t, err);
             continue;
@@ -466,7 +465,7 @@ static uz_status take_point(uz_finite_point **out, const uz_finite_run *run, uz_
         point->loads = uz_alloc(point->n_loads, sizeof *point->loads);
     }
     if (!point || !point->u || !point->r || !point->loads)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a point of a path");
+        return uz_no_memory(err, "a point of a path");
     point->part = before + run->found.load * (run->part - before);
     point->certificate = run->certificate;
     if (run->last || run->from)

@@ -310,7 +310,7 @@ static uz_status add_turning(uz_finite_run *run, uz_error *err)
     }
     const bool room = f && force;
     uz_free_all(f, force);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on rigid groups");
+    return room ? UZ_OK : uz_no_memory(err, "the forces on rigid groups");
 }
 
 /* At run->at, with nothing added; straight: what gaps bend left out. */
@@ -726,7 +726,7 @@ static uz_status find_carried(bool *carried, double *to, const uz_finite_run *ru
     }
     const bool room = alike;
     uz_free_all(part, way, alike);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a body");
+    return room ? UZ_OK : uz_no_memory(err, "the parts of a body");
 }
 
 /* May all places of rows at run->at go straight to `to`, past rigid obstacles? */

@@ -323,7 +323,7 @@ static uz_status pair_may_go(bool *may, const uz_finite_run *run, const uz_conta
             *may = node_may_go(&s, uz_group_node_at(group[k], i), beside);
         free(s.piece);
         if (!room)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of two bodies");
+            return uz_no_memory(err, "the sides of two bodies");
     }
     return UZ_OK;
 }
@@ -338,7 +338,7 @@ uz_status uz_finite_may_pass(bool *may, const uz_finite_run *run, const double *
     uz_status status = UZ_OK;
     *may = true;
     if (run->pairs && (!part || uz_mesh_number_parts(part, mesh) < 0))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of a body");
+        status = uz_no_memory(err, "the parts of a body");
     for (int64_t k = 0; k < run->scene.n_contacts && status == UZ_OK && *may; k++) {
         const uz_contact *contact = &run->scene.contacts[k];
         if (contact->kind == UZ_OBSTACLE_BODY)

@@ -168,7 +168,7 @@ static uz_status take_rows(uz_result *result, const uz_finite_run *run, uz_error
         result->n_free_strain = run->base.mesh.n_elements;
         result->free_strain = uz_alloc(result->n_free_strain, sizeof *result->free_strain);
         if (!result->free_strain)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");
+            return uz_no_memory(err, "temperatures");
         memcpy(result->free_strain, run->free_strain, (size_t)result->n_free_strain * sizeof *result->free_strain);
     }
     memcpy(result->place, run->at.u, (size_t)run->n * sizeof *result->place);
@@ -251,7 +251,7 @@ uz_status uz_finite_report(uz_result **out, uz_finite_run *run, uz_part why, dou
 {
     uz_result *result = uz_alloc_zero(1, sizeof *result);
     if (!result)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
+        return uz_no_memory(err, "a result");
     if (run->last) /* method, factor and cost: those of the last contact problem */
         result->summary = run->last->summary;
     else if (run->from)

@@ -758,7 +758,7 @@ static uz_status complete(const search *g, uz_result *result, int64_t i, uz_erro
 {
     result->grids = uz_alloc(1, sizeof *result->grids);
     if (!result->grids)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
+        return uz_no_memory(err, "the grids that were tried");
     *result->grids = g->sequence;
     result->summary.grids = result->grids;
     if (result->evaluation && is_answered(&result->summary))
@@ -767,7 +767,7 @@ static uz_status complete(const search *g, uz_result *result, int64_t i, uz_erro
         const int64_t n = result->grids->n_bisected = g->best.on.n_bisected;
         int64_t *list = result->grids->bisected = uz_alloc(n, sizeof *list);
         if (!list)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the elements that were bisected");
+            return uz_no_memory(err, "the elements that were bisected");
         if (n > 0)
             memcpy(list, g->bisected, (size_t)n * sizeof *list);
     }

@@ -87,7 +87,7 @@ static uz_status prepare(moving *m, const uz_result *first, const uz_problem *pr
     m->norm = first->summary.certificate.energy_norm;
     m->n = first->n_nodes * first->mesh.dim;
     if (!cache && !(m->cache = m->own_cache = uz_cache_new(SIZE_MAX)))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache");
+        return uz_no_memory(err, "a cache");
     uz_status status = uz_setup_acquire(&m->base, &ignored, m->cache, problem, NULL, settings, &m->hooks, err);
     if (status != UZ_OK)
         return status;

@@ -199,7 +199,7 @@ static uz_status solve_in_blocks(batch *b, uz_error *err)
     uz_run *runs = NULL;
     const int64_t width = b->blocks * UZ_LANES;
     uz_request *asked = uz_alloc_zero(width, sizeof *asked);
-    uz_status status = asked ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    uz_status status = asked ? UZ_OK : uz_no_memory(err, "a block of loads");
     if (status == UZ_OK)
         status = uz_block_create(&block, &runs, b->setup, b->problem, b->blocks, err);
     for (int64_t first = 0; status == UZ_OK && first < b->n_todo; first += width) {

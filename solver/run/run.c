@@ -38,7 +38,7 @@ uz_status uz_run_begin(uz_run *run, const uz_request *asked, uz_error *err)
     uz_milestones_init(&run->work.milestones, setup->rows.in != NULL);
     run->result = uz_alloc_zero(1, sizeof *run->result);
     if (!run->result)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
+        return uz_no_memory(err, "a result");
     uz_report_setup(run);
     return UZ_OK;
 }

@@ -120,7 +120,7 @@ uz_status uz_state_copy(uz_state **out, const uz_state *from, const uz_candidate
     bool ok = true;
     *out = NULL;
     if (!s)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
+        return uz_no_memory(err, "a state");
     *s = *from;
     s->m = !rows ? from->m : gather ? rows->count : rows->m;
     double **to[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};

@@ -104,7 +104,7 @@ static uz_status prepare(uz_semi *s, uz_error *err)
     }
     memcpy(s->target, s->of.h, (size_t)s->m * sizeof *s->target);
     if (!s->cache && !(s->cache = s->own_cache = uz_cache_new(SIZE_MAX)))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache");
+        return uz_no_memory(err, "a cache");
     return UZ_OK;
 }
 

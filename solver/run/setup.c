@@ -62,7 +62,7 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
     memset(key, 0, sizeof *key);
     uz_digest *state = uz_digest_new();
     if (!state)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+        return uz_no_memory(err, "a digest");
     const int choices[] = {(int)problem->kind, (int)settings->op, (int)settings->ordering,
                            (int)uz_setup_extent(problem, settings)};
     uz_status status = UZ_OK;
@@ -177,7 +177,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     *out = NULL;
     uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
     if (!setup)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+        return uz_no_memory(err, "a body");
     pthread_mutex_init(&setup->mutex, NULL);
     setup->doubt = NAN;
     setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
@@ -207,7 +207,7 @@ uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *proble
     *out = NULL;
     uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
     if (!setup)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+        return uz_no_memory(err, "a body");
     pthread_mutex_init(&setup->mutex, NULL);
     setup->base = base;
     setup->is_scene = true;

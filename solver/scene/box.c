@@ -207,7 +207,7 @@ static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
             }
     for (int axis = 0; axis < 3; axis++)
         free(line[axis]);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grid lines of a box");
+    return room ? UZ_OK : uz_no_memory(err, "the grid lines of a box");
 }
 
 /* ---- the whole */

@@ -153,7 +153,7 @@ uz_status uz_box_fill_groups(uz_mesh *mesh, const uz_box *box, uz_error *err)
     uz_status status = UZ_OK;
     mesh->groups = uz_alloc_zero(sides + 1, sizeof *mesh->groups);
     if (!mesh->groups)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the groups of a box");
+        return uz_no_memory(err, "the groups of a box");
     mesh->n_groups = sides + 1;
     for (int i = 0; i < sides && status == UZ_OK; i++)
         status = fill_side(&mesh->groups[i], box, i, err);

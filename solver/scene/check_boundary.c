@@ -202,7 +202,7 @@ static uz_status check_named_once(const uz_scene *scene, const uz_mesh *mesh, in
     const char *const name[2] = {mine->on, mine->with};
     unsigned char *const of[2] = {uz_alloc_zero(mesh->n_elements, 1), uz_alloc_zero(mesh->n_elements, 1)};
     const bool room = of[0] && of[1];
-    uz_status status = room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of contacts");
+    uz_status status = room ? UZ_OK : uz_no_memory(err, "the sides of contacts");
     for (int k = 0; k < 2 && room; k++) {
         const uz_group *group = uz_mesh_group(mesh, name[k], "", NULL);
         for (int64_t f = 0; group && f < group->n_faces; f++)

@@ -124,7 +124,7 @@ static uz_status find_rigid(bool *rigid, const uz_scene *scene, const uz_mesh *m
         const uz_group *whole = uz_mesh_group(mesh, scene->supports[k].on, "", NULL);
         unsigned char *of = whole ? uz_alloc_zero(mesh->n_nodes, sizeof *of) : NULL;
         if (whole && !of)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the nodes of a rigid group");
+            return uz_no_memory(err, "the nodes of a rigid group");
         for (int64_t i = 0; of && i < uz_group_node_count(mesh, whole); i++)
             of[uz_group_node_at(whole, i)] = 1;
         *rigid = of;

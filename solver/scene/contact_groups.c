@@ -69,7 +69,7 @@ static uz_status join(uz_group *out, const uz_mesh *mesh, const uz_names *groups
     out->face = uz_alloc(faces, sizeof *out->face);
     out->node = uz_alloc(nodes, sizeof *out->node);
     if (!out->face || !out->node)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the groups of a contact");
+        return uz_no_memory(err, "the groups of a contact");
     for (int64_t i = 0; i < groups->n; i++) {
         const uz_group *group = uz_mesh_group(mesh, groups->name[i], where, err);
         memcpy(out->face + out->n_faces, group->face, (size_t)group->n_faces * sizeof *out->face);
@@ -99,7 +99,7 @@ uz_status uz_mesh_join_groups(uz_mesh *mesh, const uz_scene *scene, uz_error *er
         return UZ_OK;
     uz_group *groups = uz_realloc(mesh->groups, own + lists, sizeof *groups);
     if (!groups)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the groups of a contact");
+        return uz_no_memory(err, "the groups of a contact");
     mesh->groups = groups;
     for (int64_t k = 0; k < 2 * scene->n_contacts && status == UZ_OK; k++) {
         const uz_contact *contact = &scene->contacts[k / 2];

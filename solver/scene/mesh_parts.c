@@ -80,7 +80,7 @@ uz_status uz_own_body_new(uz_own_body **out, const uz_mesh *mesh, const uz_group
     }
     if (!room || !own->first || !own->around || !own->seen || !own->queue) {
         uz_own_body_free(own);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact of a body with itself");
+        return uz_no_memory(err, "contact of a body with itself");
     }
     uz_mesh_list_around(own->first, own->around, mesh);
     *out = own;

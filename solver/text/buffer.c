@@ -89,7 +89,7 @@ uz_status uz_buffer_finish(char **text, size_t *len, uz_buffer *buffer, uz_error
     *text = NULL;
     if (!reserve(buffer, 0)) {
         uz_buffer_drop(buffer);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the text of a file");
+        return uz_no_memory(err, "the text of a file");
     }
     buffer->data[buffer->len] = '\0';
     *text = buffer->data;
