@@ -12,7 +12,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* By so much of its own size w may be off at obstacles: what brings it to where it may be is rounding. */

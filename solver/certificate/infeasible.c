@@ -8,7 +8,6 @@
 #include <float.h>
 #include <gmp.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* h'y is positive beyond what the rounding of each h_i may do to it. Its own sum is exact to far less. */

@@ -7,7 +7,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Exchanges of all wrong rows; of them that may fail to bring their number down; solutions with one factor, each from

@@ -8,7 +8,6 @@
 #include <gmp.h>
 #include <limits.h>
 #include <math.h>
-#include <stdlib.h>
 
 /* Rows that are moved together, and words multiplied in all: about a second. */
 enum { MOST_TOGETHER = 32 };

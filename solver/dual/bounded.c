@@ -9,7 +9,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The rows that bound a dof, ascending: of column j of N those whose entry is not 0. */

@@ -5,7 +5,6 @@
 #include "dual/springs.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_STEPS = 60, EXPECTED_STEPS = 20 };

@@ -9,7 +9,6 @@
 #include "core/aside.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Less is not worth waking a thread. */

@@ -14,7 +14,6 @@
 #include "methods/exchange.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Where steps are small they go on to the exact answer after the target is met: there the certificate of a cached body

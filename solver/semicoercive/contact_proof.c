@@ -8,7 +8,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 
 /* N z may miss e_i by this much before z is no use. */
 static const double WITNESS_ROUNDING = 1e-10;
