@@ -3,22 +3,10 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-/* Does each row bound one dof? Rows with several entries are left to K. */
-static bool has_bounds_only(const uz_body_model *model)
-{
-    const uz_csc *N = &model->N;
-    bool *seen = N->ptr[N->cols] == model->m ? uz_alloc_zero(model->m, sizeof *seen) : NULL, single = seen != NULL;
-    for (int64_t k = 0; single && k < model->m; k++) {
-        single = !seen[N->idx[k]];
-        seen[N->idx[k]] = true;
-    }
-    free(seen);
-    return single;
-}
 
 /* A box of equal hex8 of one isotropic material, its dofs along the axes, held by supports alone. */
 static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
@@ -34,7 +22,7 @@ static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
 uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene, bool diagonal, uz_error *err)
 {
     *made = false;
-    if (!has_equal_cells(model, scene) || !has_bounds_only(model))
+    if (!has_equal_cells(model, scene) || !uz_csc_is_single(&model->N))
         return UZ_OK;
     uz_brick *brick = uz_alloc_zero(1, sizeof *brick);
     if (!brick)

@@ -3,8 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-
-#include <stdlib.h>
+#include "linalg/linalg.h"
 
 /* In the order of preference among those that suit. */
 const uz_dual_form *const uz_dual_forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free,
@@ -24,7 +23,7 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
 {
     if (asked != UZ_OPERATOR_AUTO)
         return asked;
-    uz_dual_shape shape = {N->cols, N->rows, n_b, N->rows > SMALL_BOUNDS && uz_dual_bounds_dofs(N)};
+    uz_dual_shape shape = {N->cols, N->rows, n_b, N->rows > SMALL_BOUNDS && uz_csc_is_single(N)};
     int k = 0;
     while (k < UZ_DUAL_FORMS - 1 && !(uz_dual_forms[k]->suits && uz_dual_forms[k]->suits(&shape)))
         k++;
@@ -44,16 +43,4 @@ uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, 
         if (N->ptr[j + 1] > N->ptr[j])
             (*dofs)[(*count)++] = j;
     return UZ_OK;
-}
-
-bool uz_dual_bounds_dofs(const uz_csc *N)
-{
-    int64_t nnz = N->ptr[N->cols];
-    bool *seen = nnz == N->rows ? uz_alloc_zero(N->rows, sizeof *seen) : NULL, single = seen != NULL;
-    for (int64_t k = 0; single && k < nnz; k++) {
-        single = !seen[N->idx[k]];
-        seen[N->idx[k]] = true;
-    }
-    free(seen);
-    return single;
 }

@@ -30,7 +30,5 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
 
 /* The dofs that N touches, ascending; the caller frees *dofs. */
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);
-/* Whether each row has one entry: it bounds a dof. False also where there is no memory to tell. */
-bool uz_dual_bounds_dofs(const uz_csc *N);
 
 #endif

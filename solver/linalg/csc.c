@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "linalg/linalg.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 size_t uz_csc_bytes(const uz_csc *A)
@@ -209,6 +210,17 @@ int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column)
 {
     const int64_t k = uz_csc_seek(A, row, column);
     return k < A->ptr[column + 1] && A->idx[k] == row ? k : -1;
+}
+
+bool uz_csc_is_single(const uz_csc *A)
+{
+    bool *seen = A->ptr[A->cols] == A->rows ? uz_alloc_zero(A->rows, sizeof *seen) : NULL, single = seen != NULL;
+    for (int64_t k = 0; single && k < A->rows; k++) {
+        single = !seen[A->idx[k]];
+        seen[A->idx[k]] = true;
+    }
+    free(seen);
+    return single;
 }
 
 bool uz_entries_add(uz_entries *to, int64_t row, int64_t col, double value)

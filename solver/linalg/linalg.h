@@ -16,6 +16,9 @@ int64_t uz_csc_seek(const uz_csc *A, int64_t row, int64_t column);
 /* Where the entry of `row` in `column` is; -1: A has none. */
 int64_t uz_csc_find(const uz_csc *A, int64_t row, int64_t column);
 
+/* Whether each row has one entry, so that a contact row bounds a dof. False also where there is no memory to tell. */
+bool uz_csc_is_single(const uz_csc *A);
+
 /* What columns begin to end - 1 of uz_csc_symv's A add to y: nothing above row `begin`. */
 void uz_csc_symv_columns(double *y, const uz_csc *A, double alpha, const double *x, int64_t begin, int64_t end);
 

@@ -3,10 +3,11 @@
 #include "dual/form.h"
 
 #include "amg/amg.h"
-#include "linalg/blas.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "linalg/blas.h"
+#include "linalg/linalg.h"
 #include "scene/breadth.h"
 
 #include <limits.h>
@@ -272,7 +273,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .n_entries = N->ptr[N->cols],
                           .modes = solid ? 6 : 3,
                           .active_set = by_active_set,
-                          .bounds = by_active_set && uz_dual_bounds_dofs(N),
+                          .bounds = by_active_set && uz_csc_is_single(N),
                           .alone = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
                           .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
