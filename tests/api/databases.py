@@ -1,5 +1,6 @@
 """A PostgreSQL server of the package (tests/postgresql.sh) on a socket in a temporary folder, and databases there."""
 import atexit
+import functools
 import os
 import pathlib
 import shutil
@@ -101,12 +102,14 @@ class Server:
         return connection
 
 
-SHARED = []
+@functools.cache
+def shared():
+    """A server that all tests of this program have, and that ends with it."""
+    server = Server()
+    atexit.register(server.end)
+    return server
 
 
 def address_of_new():
-    """Of a new database of a server that all tests of this program have."""
-    if not SHARED:
-        SHARED.append(Server())
-        atexit.register(SHARED[0].end)
-    return SHARED[0].address(SHARED[0].database())
+    """Of a new database of that server."""
+    return shared().address(shared().database())

@@ -19,14 +19,14 @@ from service import ENDLESS, MATRICES, SCENE, Service, check, expect, together, 
 
 LISTENERS = ("SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND application_name = 'uzawad'"
              " AND query ~ 'LISTEN|pg_notify|pg_terminate_backend'")
-SERVER = None  # one for all tests, made by the first
+SERVER = None  # that of all tests, made by the first
 
 
 @contextlib.contextmanager
 def daemons(build, n, *options):
     """n daemons on a new database, and its name."""
     global SERVER
-    SERVER = SERVER or databases.Server()
+    SERVER = databases.shared()
     name = SERVER.database()
     some = [Service(build, "--workers", "1", *options, db=SERVER.address(name)) for _ in range(n)]
     try:
@@ -395,8 +395,4 @@ def test_connections_that_are_cut_lose_nothing(s):
 
 
 if __name__ == "__main__":
-    try:
-        service.main(globals())
-    finally:
-        if SERVER:
-            SERVER.end()
+    service.main(globals())

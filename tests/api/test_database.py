@@ -13,13 +13,7 @@ import databases
 import service
 from service import ENDLESS, MATRICES, Service, Skip, check, wait_until
 
-SERVER = None  # one for all tests, made by the first
-
-
-def server():
-    global SERVER
-    SERVER = SERVER or databases.Server()
-    return SERVER
+server = databases.shared  # made by the first test that asks for it
 
 
 @contextlib.contextmanager
@@ -150,8 +144,4 @@ def test_a_pooler_in_transaction_mode(s):
 
 
 if __name__ == "__main__":
-    try:
-        service.main(globals())
-    finally:
-        if SERVER:
-            SERVER.end()
+    service.main(globals())

@@ -31,7 +31,7 @@ def move(build, *words, status=0, environment=None):
 @contextlib.contextmanager
 def database():
     global SERVER
-    SERVER = SERVER or databases.Server()
+    SERVER = databases.shared()
     name = SERVER.database()
     yield SERVER.address(name), name
 
@@ -174,8 +174,4 @@ test_what_is_refused.options = (None,)
 
 
 if __name__ == "__main__":
-    try:
-        service.main(globals())
-    finally:
-        if SERVER:
-            SERVER.end()
+    service.main(globals())

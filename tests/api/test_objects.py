@@ -24,7 +24,7 @@ KEYS = {"AWS_ACCESS_KEY_ID": object_store.KEY, "AWS_SECRET_ACCESS_KEY": object_s
 def daemons(build, n, *options, least="2K", start=True):
     """n daemons, a database and a bucket."""
     global SERVER
-    SERVER = SERVER or databases.Server()
+    SERVER = databases.shared()
     name, place = SERVER.database(), object_store.ObjectStore()
     some = [Service(build, "--workers", "1", "--objects", place.url(), "--object-region", object_store.REGION,
                     "--object-least", least, *options, db=SERVER.address(name)) for _ in range(n)]
@@ -294,8 +294,4 @@ def test_a_start_says_what_is_wrong(s):
 
 
 if __name__ == "__main__":
-    try:
-        service.main(globals())
-    finally:
-        if SERVER:
-            SERVER.end()
+    service.main(globals())
