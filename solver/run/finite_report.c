@@ -291,6 +291,23 @@ static void compare_forces(double *off, double *most, const uz_resultant *here, 
     }
 }
 
+/* The largest force that acts where resultants do not tell: what presses a ring all around has none, nor have supports
+ * that bend or twist a body; a moment counts as the force that has it over the body's size. */
+static double force_within(const uz_evaluation *e, const uz_body_model *model)
+{
+    const double size = uz_mesh_size(&model->mesh);
+    double middle[3], most = 0;
+    uz_mesh_middle(middle, &model->mesh);
+    for (int64_t i = 0; i < e->n_contacts; i++)
+        most = fmax(most, e->totals[i].normal_force);
+    for (int64_t i = 0; i < e->n_supports && model->kind != UZ_AXISYMMETRIC; i++) {
+        double moment[3];
+        uz_cross3(moment, middle, e->supports[i].force);
+        most = fmax(most, sqrt(uz_distance2(e->supports[i].moment, moment, 3)) / size);
+    }
+    return most;
+}
+
 /* Takes what v has of q (n, of norm 1) off it; returns how much that was. */
 static double take_off(double *v, const double *q, int64_t n)
 {
@@ -393,6 +410,7 @@ uz_status uz_finite_compare(uz_small *out, const uz_finite_run *run, const uz_re
         return status;
     compare_forces(&off, &most, here->contacts, there->contacts, here->n_contacts);
     compare_forces(&off, &most, here->supports, there->supports, here->n_supports);
+    most = fmax(most, force_within(here, &run->base));
     most = fmax(most, UZ_LEAST_FORCE * here->loads_size); /* of loads that hold each other supports have rounding */
     if (told->displacement > 0)
         most = fmax(most, fmax(LEAST_OF_ENERGY, told->residual) * energy / told->displacement);
