@@ -44,8 +44,9 @@ uz_status uz_solve_finite_near(uz_result **results, const uz_problem *problem, c
                                double *const *near, const uz_finite_effort *effort, const uz_hooks *hooks,
                                uz_error *err);
 
-/* Another one: of kinematics AUTO with laws of finite strain. Answers are those of small deformation, of fixed
- * kinematics, where that is not off by more than is tolerable, else those of uz_solve_finite. */
+/* Another one: of kinematics AUTO with laws of finite strain, or a mesh that is chosen. Answers are those of small
+ * deformation, of fixed kinematics, where that is not off by more than is tolerable, and under the linear law; else
+ * those of uz_solve_finite. */
 bool uz_is_weighed(const uz_problem *problem);
 uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const uz_settings *settings,
                            const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);

@@ -1,6 +1,6 @@
 /* solve.c: where a call enters. What follows stands in the order in which control goes down (solve.h):
  *
- *     auto, laws of finite strain -> what is given, compared with finite kinematics
+ *     auto, laws of finite strain or chosen cells -> what is given or chosen, compared with finite kinematics
  *     chosen cells -> grids -> rounds of contact rows -> blocks or one by one -> one load
  *                           -> what the answers of the rounds ask for
  *                           -> of finite kinematics:

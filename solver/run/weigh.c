@@ -214,28 +214,31 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
 bool uz_is_weighed(const uz_problem *problem)
 {
     return problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_AUTO &&
-           uz_has_finite_law(&problem->scene);
+           (uz_has_finite_law(&problem->scene) || uz_is_mesh_chosen(problem));
 }
 
 /* Of a case whose mesh was chosen for small deformation: what that errs by there; *compared: false where that is
- * surely little, or where there was no time to. */
+ * surely little, where there was no time to, or under the linear law, whose answer stays. */
 static uz_status weigh_chosen(bool *compared, uz_result *result, const uz_problem *problem, int64_t i,
                               const uz_hooks *hooks, double deadline, uz_error *err)
 {
+    const bool own_laws = uz_has_finite_law(&problem->scene);
     uz_problem one = uz_problem_of_case(problem, i);
     uz_settings coarse = uz_settings_default();
     uz_result *large = NULL;
     const uz_outcome outcome = result->summary.outcome;
+    *compared = false;
     /* what the mesh is short of says nothing of the model */
-    *compared = (outcome == UZ_CONVERGED || outcome == UZ_MESH_LIMIT) && is_asked(result, &one, true);
-    if (!*compared)
+    if ((outcome != UZ_CONVERGED && outcome != UZ_MESH_LIMIT) || !is_asked(result, &one, own_laws))
         return UZ_OK;
-    one.scene.kinematics = UZ_KINEMATICS_FINITE;
     if (one.scene.box.automatic)
         memcpy(one.scene.box.cells, result->grids->cells, sizeof one.scene.box.cells);
     one.scene.box.automatic = false;
     one.scene.bisected = result->grids->bisected;
     one.scene.n_bisected = result->grids->n_bisected;
+    if (!own_laws)
+        return compare_linear(result, &one, hooks, deadline, err);
+    one.scene.kinematics = UZ_KINEMATICS_FINITE;
     one.scene.compared = true;
     coarse.relative_error = COMPARED_TO;
     const uz_status status = solve_large(&large, result, &one, &coarse, hooks, deadline, err);
@@ -308,7 +311,7 @@ uz_status uz_solve_weighed(uz_result **results, const uz_problem *problem, const
     uz_status status = uz_check_settings(settings, err);
     if (status == UZ_OK)
         status = uz_check_problem(problem, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && uz_has_finite_law(&problem->scene))
         status = uz_check_finite_settings(settings, err);
     if (status != UZ_OK)
         return status;

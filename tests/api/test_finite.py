@@ -432,6 +432,24 @@ def test_a_body_between_another_and_a_plane(s):
     check(summary["outcome"] == "converged" and summary["resultants"]["contacts"][1]["force"][1] > 0.01, summary)
 
 
+def test_the_linear_law_is_compared_on_a_mesh_that_is_chosen(s):
+    """A beam on a round support, in each case whose load is not small, as on a mesh that is given: nothing was said of 7 % in forces."""
+    beam = {"problem": {"kind": "scene", "model": "plane_strain", "materials": [{"on": "all", "young": 5, "poisson": 0.45}],
+                        "supports": [{"on": "left", "ux": 0, "uy": 0}], "loads": [{"on": "top", "pressure": 0.01}],
+                        "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [30, -20], "radius": 19}}}]}}
+    least = [{"name": "whole"}, {"name": "least", "loads": [{"on": "top", "pressure": 1e-5}]}]
+    for mesh, more in (({"box": {"size": [40, 10], "cells": [20, 5]}, "refine": "auto"}, {"cases": least}),
+                       ({"box": {"size": [40, 10], "cells": "auto"}}, {}),
+                       ({"box": {"size": [40, 10], "cells": [20, 5]}, "refine": "auto"}, {"solver": {"accuracy": {"total": 0.2, "guaranteed": True}}})):
+        beam["problem"]["mesh"] = mesh
+        _, found = answer(s, {"solver": {"accuracy": {"total": 0.15}}, **beam, **more}, "summary")
+        told = [case["summary"] for case in found.get("cases", [found])]
+        check(all(one["outcome"] == "converged" and "finite" not in one for one in told), told)
+        check(0.06 < told[0]["small_deformation"]["error"] < 0.08 and told[0]["small_deformation"]["in"] == "forces", told[0])
+        check(told[0]["warnings"][-1]["code"] == "large_deformation" and len(told[0]["mesh"]["ladder"]) > 1, told[0])
+        check(not any("small_deformation" in one for one in told[1:]), told[1:])
+
+
 def test_what_is_compared_does_not_depend_on_how_a_body_stands(s):
     """A block that is pulled so little that it is not compared, and one that is, by as much as it stands along the axes or across them: the box
     around the body made it half as stocky at 45 degrees."""
