@@ -2,6 +2,7 @@
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/error.h"
 #include "core/vector3.h"
 #include "scene/check.h"
@@ -78,11 +79,61 @@ static uz_status add_at_point(const loading *x, const double *share, const uz_gr
     return UZ_OK;
 }
 
+enum { SIDES_AT_ONCE = 128, SIDES_OF_PART = 32 };
+
+/* What a traction or pressure does to the nodes of a side. */
+typedef struct {
+    int64_t node[UZ_FACE_NODES];
+    double f[3 * UZ_FACE_NODES];
+    int nodes;
+} loaded_side;
+
+/* Some sides as the threads that share them see them. */
+typedef struct {
+    const loading *x;
+    const uz_face *face;
+    int count;
+    loaded_side side[SIDES_AT_ONCE];
+} loading_sides;
+
+static void load_sides(void *ctx, int part)
+{
+    loading_sides *s = ctx;
+    const uz_load *load = s->x->load;
+    const int end = (part + 1) * SIDES_OF_PART < s->count ? (part + 1) * SIDES_OF_PART : s->count;
+    for (int i = part * SIDES_OF_PART; i < end; i++) {
+        loaded_side *to = &s->side[i];
+        uz_side side;
+        double xyz[3 * UZ_ELEMENT_NODES], pressure[UZ_FACE_NODES];
+        uz_body_side(&side, xyz, to->node, s->x->model, s->face[i]);
+        memset(to->f, 0, sizeof to->f);
+        to->nodes = side.nodes;
+        for (int a = 0; a < side.nodes; a++)
+            pressure[a] = load->value;
+        if (load->kind == UZ_LOAD_PRESSURE)
+            uz_side_add_pressure(to->f, &side, pressure);
+        else
+            uz_side_add_traction(to->f, &side, load->v);
+    }
+}
+
+/* Side by side, in their order, whoever has computed them. */
+static void add_sides(const loading *x, const uz_group *group)
+{
+    loading_sides s = {.x = x};
+    for (int64_t first = 0; first < group->n_faces; first += s.count) {
+        s.face = group->face + first;
+        s.count = group->n_faces - first < SIDES_AT_ONCE ? (int)(group->n_faces - first) : SIDES_AT_ONCE;
+        uz_aside_share(load_sides, &s, (s.count + SIDES_OF_PART - 1) / SIDES_OF_PART);
+        for (int i = 0; i < s.count; i++)
+            add_to_nodes(x, s.side[i].f, s.side[i].node, s.side[i].nodes);
+    }
+}
+
 static uz_status add_load(const loading *x, const char *where, uz_error *err)
 {
     const uz_mesh *mesh = &x->model->mesh;
     double xyz[3 * UZ_ELEMENT_NODES];
-    int64_t node[UZ_FACE_NODES];
     if (x->load->kind == UZ_LOAD_NODE_FORCE) {
         if (x->load->node < 0 || x->load->node >= mesh->n_nodes)
             return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
@@ -99,18 +150,7 @@ static uz_status add_load(const loading *x, const char *where, uz_error *err)
     switch (x->load->kind) {
     case UZ_LOAD_TRACTION:
     case UZ_LOAD_PRESSURE:
-        for (int64_t i = 0; i < group->n_faces; i++) {
-            uz_side side;
-            double pressure[UZ_FACE_NODES], of_side[3 * UZ_FACE_NODES] = {0};
-            uz_body_side(&side, xyz, node, x->model, group->face[i]);
-            for (int a = 0; a < side.nodes; a++)
-                pressure[a] = x->load->value;
-            if (x->load->kind == UZ_LOAD_PRESSURE)
-                uz_side_add_pressure(of_side, &side, pressure);
-            else
-                uz_side_add_traction(of_side, &side, x->load->v);
-            add_to_nodes(x, of_side, node, side.nodes);
-        }
+        add_sides(x, group);
         return UZ_OK;
     case UZ_LOAD_FORCE: {
         double *share = uz_alloc_zero(mesh->n_nodes, sizeof *share);

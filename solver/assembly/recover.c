@@ -47,14 +47,27 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
             nodal[i] = uz_mesh_value_amid(&model->mesh, i / dim, nodal + i % dim, dim);
 }
 
+typedef struct {
+    double *u;
+    const int64_t *of;
+    const double *nodal;
+} restricting;
+
+static void give_dofs(void *ctx, int64_t begin, int64_t end)
+{
+    const restricting *x = ctx;
+    for (int64_t i = begin; i < end; i++)
+        if (x->of[i] >= 0)
+            x->u[x->of[i]] = x->nodal[i];
+}
+
 /* What is along each free dof of a node; in the places of rigid motions it means nothing. */
 static void restrict_by_node(double *u, const uz_body_model *model, const double *nodal)
 {
     const int dim = model->mesh.dim;
     const int64_t total = model->mesh.n_nodes * dim;
-    for (int64_t i = 0; !model->frame_of && i < total; i++)
-        if (model->dof[i] >= 0)
-            u[model->dof[i]] = nodal[i];
+    if (!model->frame_of) /* each dof is of one node */
+        uz_by_pieces(give_dofs, &(restricting){u, model->dof, nodal}, total);
     for (int64_t a = 0; model->frame_of && a < model->mesh.n_nodes; a++) {
         double local[3];
         uz_to_frame(local, model, a, nodal + a * dim);
