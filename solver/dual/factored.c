@@ -32,7 +32,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     if (status != UZ_OK)
         return status;
     status = uz_factor_solve(load->dual->factor, x->ws, x->sparse.base, p, x->sparse.work2, err);
-    return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
+    return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, true, err) : status;
 }
 
 static void unload(uz_dual_load *load)

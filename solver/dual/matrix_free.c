@@ -153,7 +153,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     if (!told)
         status = solve_base(x, load->dual->m > 0 && are_few(load->dual->m, d) ? BASE_ROUGHER : BASE_ROUGH, err);
     if (status == UZ_OK)
-        status = uz_sparse_load_end(&x->sparse, p, err);
+        status = uz_sparse_load_end(&x->sparse, p, !told, err);
     x->near = status == UZ_OK && told && load->near_u;
     if (x->near) {
         uz_long_copy(d, x->sparse.box->u, load->near_u);
@@ -250,10 +250,14 @@ static bool apply_known(free_load *x, double *Dr, const double *r, uz_status *st
         return false;
     if (guessed && x->unmeasured)
         *status = measure_held(x, r, err);
-    for (int64_t j = 0; j < d; j++)
-        x->sparse.response[j] = guessed ? u[j] - x->sparse.base[j] : 0.0;
     memset(Dr, 0, (size_t)m * sizeof *Dr);
-    uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
+    if (guessed) {
+        for (int64_t j = 0; j < d; j++)
+            x->sparse.response[j] = u[j] - x->sparse.base[j];
+        uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
+    } else {
+        memset(x->sparse.response, 0, (size_t)d * sizeof *x->sparse.response);
+    }
     x->sparse.slack = guessed ? x->held_slack : x->base_slack;
     load->left = guessed ? x->held_slack + x->base_slack : 0.0;
     return true;

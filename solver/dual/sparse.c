@@ -92,16 +92,17 @@ uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
 }
 
-uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
+uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, bool solved, uz_error *err)
 {
     uz_dual_load *load = &x->load;
     const uz_dual *dual = load->dual;
     const uz_bounds *bounds = &((const uz_sparse *)dual)->bounds;
     load->psi0 = 0.0;
-    for (int64_t j = 0; j < dual->d; j++)
+    for (int64_t j = 0; solved && j < dual->d; j++)
         load->psi0 -= 0.5 * p[j] * x->base[j];
     memcpy(load->g0, load->h, (size_t)dual->m * sizeof *load->g0);
-    uz_csc_gaxpy(load->g0, &dual->N, -1.0, x->base);
+    if (solved)
+        uz_csc_gaxpy(load->g0, &dual->N, -1.0, x->base);
     if (!bounds->dof)
         return UZ_OK;
     if (!x->p) {

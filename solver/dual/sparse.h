@@ -56,7 +56,8 @@ typedef struct {
 uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err);
 void uz_sparse_clear(uz_dual *dual);
 uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err);
-uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err); /* keeps p in x->p */
+/* Keeps p in x->p; solved: the base is not 0. */
+uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, bool solved, uz_error *err);
 void uz_sparse_unload(uz_sparse_load *x);
 uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);

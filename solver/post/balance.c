@@ -391,7 +391,7 @@ static void tell_groups(balance *b, bool large)
 
 static bool make_room(balance *b, int64_t n)
 {
-    b->load = uz_alloc_zero(n * b->dim, sizeof *b->load);
+    b->load = uz_alloc(n * b->dim, sizeof *b->load); /* is written as a whole */
     b->contact = uz_alloc_zero(n * b->dim, sizeof *b->contact);
     b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
     b->held = uz_alloc(n, sizeof *b->held);
