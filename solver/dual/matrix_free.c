@@ -17,6 +17,7 @@
 #include "dual/sparse.h"
 
 #include "core/alloc.h"
+#include "core/aside.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "law/sign.h"
@@ -46,6 +47,9 @@
 #define NO_DRIFT 1e-8
 enum { STEPS_MOST = 5000 };
 
+/* Parts of a vector that have digests of their own, for as many threads. */
+enum { DIGESTS = 4 };
+
 /* How well the equations of a load are solved. Slacks are bounds in the energy norm. */
 typedef struct {
     uz_sparse_load sparse;
@@ -68,9 +72,9 @@ typedef struct {
     double *right;     /* d: a right-hand side, or what solves one to bound a norm */
     double *u, *r;     /* d, m: the last answer of rows of many entries; NULL: none was asked for */
     int guesses;       /* of these rows so far, most of which were wrong */
-    char bounded[65];  /* digest of the e whose e'K^-1 e was bounded last, "" before, */
-    double bound;      /* and that bound */
-    double enough;     /* which is sharp, or not above this */
+    char bounded[DIGESTS][65]; /* digests of the parts of the e whose e'K^-1 e was bounded last, "" before, */
+    double bound;              /* and that bound */
+    double enough;             /* which is sharp, or not above this */
 } free_load;
 
 /* Guesses of rows of many entries that are solved for before iterations do better. */
@@ -443,22 +447,43 @@ static uz_status bound_inverse_norm(free_load *x, double *value, double *e, doub
     return status;
 }
 
+/* A vector as the threads that share its digests see it. */
+typedef struct {
+    const double *e;
+    int64_t n;
+    char hex[DIGESTS][65];
+} digesting;
+
+static void digest_part(void *ctx, int part)
+{
+    digesting *x = ctx;
+    const int64_t begin = x->n * part / DIGESTS, end = x->n * (part + 1) / DIGESTS;
+    uz_digest *digest = uz_digest_new();
+    memset(x->hex[part], 0, sizeof x->hex[part]);
+    if (digest) {
+        uz_digest_add(digest, x->e + begin, (size_t)(end - begin) * sizeof *x->e);
+        uz_digest_end(digest, x->hex[part]);
+    }
+}
+
 /* An answer is certified again with rows that touch nothing, or from the same reactions: its e is the same then. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, double enough, uz_error *err)
 {
     free_load *x = ctx;
-    char hex[65];
-    uz_digest *digest = uz_digest_new();
-    if (digest)
-        uz_digest_add(digest, e, (size_t)x->cg.n * sizeof *e);
-    const bool known = digest && uz_digest_end(digest, hex);
-    if (known && strcmp(hex, x->bounded) == 0 && (x->bound <= enough || x->enough <= enough)) {
+    digesting own = {.e = e, .n = x->cg.n};
+    uz_aside_share(digest_part, &own, DIGESTS);
+    bool known = true, same = true;
+    for (int part = 0; part < DIGESTS; part++) {
+        known = known && own.hex[part][0] != 0;
+        same = same && strcmp(own.hex[part], x->bounded[part]) == 0;
+    }
+    if (known && same && (x->bound <= enough || x->enough <= enough)) {
         *value = x->bound;
         return UZ_OK;
     }
     const uz_status status = bound_inverse_norm(x, value, e, enough, err);
     if (status == UZ_OK && known) {
-        memcpy(x->bounded, hex, sizeof hex);
+        memcpy(x->bounded, own.hex, sizeof own.hex);
         x->bound = *value;
         x->enough = enough;
     }
