@@ -173,6 +173,16 @@ void uz_principal_free(uz_principal *part)
     uz_free_all(part->dof, part->place, part->room, part);
 }
 
+/* Rooms of a substitution for one right-hand side. CHOLMOD 3 makes them itself, one after the other, but forgets that
+ * there was no memory for the first where there is for the second, and reads it (cholmod_solve2). */
+static bool make_rooms(uz_principal *part, size_t n)
+{
+    const cholmod_factor *L = part->L;
+    cholmod_common *common = &part->ws->common;
+    return cholmod_l_ensure_dense(&part->Y, n, 1, n, CHOLMOD_REAL, common) &&
+           (!L->is_super || cholmod_l_ensure_dense(&part->E, 1, L->maxesize, 1, CHOLMOD_REAL, common));
+}
+
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)
 {
     if (part->n_free == 0)
@@ -190,8 +200,9 @@ uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)
                        .dtype = CHOLMOD_DOUBLE};
     for (int64_t k = 0; k < part->n_free; k++)
         part->room[k] = x[part->dof[k]];
-    bool ok = cholmod_l_solve2(CHOLMOD_A, part->L, &B, NULL, &part->X, NULL, &part->Y, &part->E, common);
-    if (common->status == CHOLMOD_OUT_OF_MEMORY)
+    const bool room = make_rooms(part, n_free);
+    bool ok = room && cholmod_l_solve2(CHOLMOD_A, part->L, &B, NULL, &part->X, NULL, &part->Y, &part->E, common);
+    if (!room || common->status == CHOLMOD_OUT_OF_MEMORY)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)part->n_free);
     if (!ok || common->status != CHOLMOD_OK)
         return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", common->status);
