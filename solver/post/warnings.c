@@ -800,6 +800,7 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
     const uz_summary *s = &result->summary;
     const doubts d = {
         model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
+    look_at_apart(&d, result->g); /* first: the outcome goes by it, and there is room for so many warnings alone */
     if (is_steep(&d, STEEP))
         doubt_elements(&d);
     uz_status status = UZ_OK;
@@ -836,6 +837,5 @@ uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz
         look_at_overlap(&d, k);
     }
     look_at_peak(&d, result->pressure);
-    look_at_apart(&d, result->g);
     return status;
 }

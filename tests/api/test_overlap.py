@@ -124,10 +124,10 @@ def test_both_sides_are_looked_at(s):
 def test_what_touches_nowhere_is_not_converged(s):
     """A ball of six sides beside a face of hex20, or of twenty: middles with a share of their ends' gaps are pressed by it. A finer
     mesh tells that nothing is, and where the face is moved into the ball it touches: then the outcome is none of this."""
-    def beside(radius, gap, push, refine):
+    def beside(radius, gap, push, refine, turned=()):
         mesh = {"box": {"size": [4, 4, 1], "cells": [4, 4, 1], "element": "hex20"}, **({"refine": "auto"} if refine else {})}
         request = {"problem": {"kind": "scene", "model": "solid", "mesh": mesh, "materials": [{"on": "all", "young": 1, "poisson": 0.3}],
-                               "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": push}],
+                               "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": push}, *turned],
                                "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [2, 2.5, 1 + gap + radius], "radius": radius}}}]}}
         return summary_of(s, {**request, **({"solver": {"accuracy": {"relative_error": 0.2}}} if refine else {})})
 
@@ -137,6 +137,10 @@ def test_what_touches_nowhere_is_not_converged(s):
         if radius == 6:
             finer = beside(radius, gap, push, True)
             check(finer["outcome"] == "converged" and finer["contact"]["force"] == [0, 0, 0] and len(finer["mesh"]["ladder"]) > 1, finer)
+    # nor where there is no room for another warning
+    turned = [{"on": {"where": {"nearest": place}}, "rotation": {"about": place, "axis": [0, 0, 1], "angle": 20}} for place in ([4, y, 0] for y in range(5))]
+    summary = beside(6, 0.004, 0, False, turned)
+    check(summary["outcome"] == "mesh_limit" and len(summary["warnings"]) == 8, summary["outcome"], summary["warnings"])
     touching = beside(6, 0.05, 0.1, False)
     check(touching["outcome"] == "converged" and "pressed_apart" not in warned(touching) and touching["contact"]["active"] > 1, touching)
 
