@@ -200,9 +200,8 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
     const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
     const uz_outcome outcome = (*result)->summary.outcome;
     const bool precise = outcome == UZ_PRECISION_LIMIT && (*result)->summary.certificate.relative_error <= COMPARED_TO;
-    const bool answered = outcome == UZ_CONVERGED || /* mesh_limit: of a quantity */
-                          (own_laws && (outcome == UZ_MESH_LIMIT || precise));
-    if (!answered || !is_asked(*result, one, own_laws))
+    /* what the mesh is short of says nothing of the model */
+    if ((outcome != UZ_CONVERGED && outcome != UZ_MESH_LIMIT && !precise) || !is_asked(*result, one, own_laws))
         return UZ_OK;
     if (own_laws)
         return choose(result, one, settings, hooks, started, err);

@@ -448,6 +448,11 @@ def test_the_linear_law_is_compared_on_a_mesh_that_is_chosen(s):
         check(0.06 < told[0]["small_deformation"]["error"] < 0.08 and told[0]["small_deformation"]["in"] == "forces", told[0])
         check(told[0]["warnings"][-1]["code"] == "large_deformation" and len(told[0]["mesh"]["ladder"]) > 1, told[0])
         check(not any("small_deformation" in one for one in told[1:]), told[1:])
+    # what a mesh that is given is short of says nothing of the model
+    limited = answer(s, {**beam, "problem": {**beam["problem"], "mesh": {"box": {"size": [40, 10], "cells": [20, 5]}}},
+                         "solver": {"accuracy": {"total": 0.01}}}, "summary")[1]["summary"]
+    check(limited["outcome"] == "mesh_limit" and 0.06 < limited["small_deformation"]["error"] < 0.08, limited)
+    check(limited["warnings"][-1]["code"] == "large_deformation", limited["warnings"])
 
 
 def test_what_is_compared_does_not_depend_on_how_a_body_stands(s):
