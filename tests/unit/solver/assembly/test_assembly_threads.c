@@ -1,4 +1,4 @@
-/* K that threads share is that of one thread, to the last bit, and so is what is said of a bad element. */
+/* K and loads that threads share are those of one thread, to the last bit, and so is what is said of a bad element. */
 #include "assembly/parts.h"
 #include "body_fixture.h"
 #include "core/aside.h"
@@ -92,6 +92,65 @@ TEST(the_first_bad_element_is_named)
         CHECK_STR(err.message, said);
     }
     uz_aside_allow(1);
+    uz_body_model_clear(&body);
+    uz_scene_clear(&s);
+}
+
+/* What a pressure or traction does, side by side in their order. */
+static void add_sides(double *f, const uz_body_model *body, const uz_load *load)
+{
+    uz_error err = {0};
+    const uz_group *group = uz_mesh_group(&body->mesh, load->on, "", &err);
+    for (int64_t i = 0; i < group->n_faces; i++) {
+        uz_side side;
+        int64_t node[UZ_FACE_NODES];
+        double xyz[3 * UZ_FACE_NODES], pressure[UZ_FACE_NODES], own[3 * UZ_FACE_NODES] = {0};
+        uz_body_side(&side, xyz, node, body, group->face[i]);
+        for (int a = 0; a < side.nodes; a++)
+            pressure[a] = load->value;
+        if (load->kind == UZ_LOAD_PRESSURE)
+            uz_side_add_pressure(own, &side, pressure);
+        else
+            uz_side_add_traction(own, &side, load->v);
+        for (int k = 0; k < 3 * side.nodes; k++)
+            f[3 * node[k / 3] + k % 3] += own[k];
+    }
+}
+
+TEST(threads_load_the_same_bits)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){1, 1, 1}, (int64_t[3]){N, N, N});
+    uz_error err = {0};
+    body_give_mesh(&s, bend);
+    body_hold(&s, "left", 0, 0, 0);
+    body_load(&s, UZ_LOAD_PRESSURE, "top", 2, 0, 0);
+    body_load(&s, UZ_LOAD_TRACTION, "right", 1, -2, 0.5);
+    uz_body_model body = body_model(&s);
+    const int64_t n = 3 * body.mesh.n_nodes;
+    double *f = calloc((size_t)n, sizeof *f), *p = calloc((size_t)body.d, sizeof *p);
+    double *own = malloc((size_t)n * sizeof *own), *q = malloc((size_t)body.d * sizeof *q);
+    for (int64_t k = 0; k < s.n_loads; k++)
+        add_sides(f, &body, &s.loads[k]);
+    for (int64_t i = 0; i < n; i++)
+        if (body.dof[i] >= 0)
+            p[body.dof[i]] = f[i];
+    CHECK_INT(uz_aside_begin(THREADS), THREADS);
+    for (int threads = 1; threads <= THREADS; threads = more_threads(threads, THREADS)) {
+        uz_aside_allow(threads);
+        (void)uz_aside_used();
+        CHECK_INT(uz_nodal_loads(own, &body, &s, &err), UZ_OK);
+        CHECK_INT(uz_aside_used(), threads);
+        CHECK(memcmp(own, f, (size_t)n * sizeof *f) == 0);
+        memset(q, 0xff, (size_t)body.d * sizeof *q);
+        uz_gather_nodal(q, &body, own);
+        CHECK_INT(uz_aside_used(), threads);
+        CHECK(memcmp(q, p, (size_t)body.d * sizeof *p) == 0);
+    }
+    uz_aside_allow(1);
+    free(f);
+    free(p);
+    free(own);
+    free(q);
     uz_body_model_clear(&body);
     uz_scene_clear(&s);
 }
