@@ -89,13 +89,17 @@ def check_all(daemon, name, posted):
 
 
 def test_a_role_with_the_rights_of_the_documents(s):
-    with daemons(s.build, 1) as (_, name):
+    with daemons(s.build, 1) as ((owner,), name):
+        check(owner.end() == 0, owner.log())
         SERVER.sql(name, "CREATE ROLE daemon LOGIN; GRANT USAGE ON SCHEMA uzawa TO daemon; GRANT SELECT, INSERT, UPDATE,"
                          " DELETE ON ALL TABLES IN SCHEMA uzawa TO daemon;"
-                         " GRANT USAGE ON ALL SEQUENCES IN SCHEMA uzawa TO daemon")
+                         " GRANT USAGE ON ALL SEQUENCES IN SCHEMA uzawa TO daemon;"
+                         " REVOKE EXECUTE ON FUNCTION pg_terminate_backend FROM PUBLIC;"  # as some do
+                         " INSERT INTO uzawa.node(id, host, pid, begun, seen) VALUES ('gone', '', 0, 0, 0)")
         other = Service(s.build, "--workers", "1", db=SERVER.address(name).replace("postgres@", "daemon@"))
         try:
             other.start()
+            wait_until(lambda: not SERVER.sql(name, "SELECT 1 FROM uzawa.node WHERE id = 'gone'"))  # by its beat
             posted = {other.post(numbered(i)).json["id"]: i for i in range(5)}
             check_all(other, name, posted)
             job = next(iter(posted))
@@ -292,16 +296,20 @@ def test_one_is_stopped_past_its_lease(s):
 
 
 def test_one_is_stopped_in_the_midst_of_a_transaction(s):
-    """What it has locked is free again, though its connection stands: its job is run by another."""
+    """What it has locked is free again, though its connection stands: its job is run by another. Where nothing is locked
+    it may send a large request on a slow way."""
     with daemons(s.build, 2) as ((a, b), name):
         job = a.post(ENDLESS).json["id"]
         stopped, other = run_by((a, b), job)
         halt(stopped)
-        with SERVER.silent(name, f"SELECT 1 FROM uzawa.job WHERE id = '{job}' FOR UPDATE"):
+        with (SERVER.silent(name, "SELECT 42"), SERVER.silent(name, "SELECT 43, uzawa.take_queue(true)"),
+              SERVER.silent(name, f"SELECT 1 FROM uzawa.job WHERE id = '{job}' FOR UPDATE")):
             wait_until(lambda: SERVER.sql(name, "SELECT 1 FROM pg_stat_activity WHERE query LIKE '%FOR UPDATE' AND"
                                                 " wait_event = 'ClientRead' AND state = 'active'"))
             SERVER.sql(name, f"DELETE FROM uzawa.node WHERE pid = {stopped.process.pid}")  # its jobs are nobody's from here on
             wait_until(lambda: any(event["job"] == job for event in other.events("job_started")), seconds=60)
+            wait_until(lambda: not SERVER.sql(name, "SELECT 1 FROM pg_stat_activity WHERE query LIKE 'SELECT 43%'"))
+            check(SERVER.sql(name, "SELECT 1 FROM pg_stat_activity WHERE query = 'SELECT 42'"), "it was cut off")
         stopped.process.send_signal(signal.SIGCONT)
         other.request("DELETE", f"/v1/jobs/{job}")
 

@@ -110,12 +110,14 @@ static bool send_message(postgresql_store *s, link_to *l)
 
 /* Ends the transactions of daemons that fell silent in their midst: one that is stopped, or whose machine has gone.
  * What they have locked nobody else could end, run again or write. PostgreSQL's own limit for idle transactions does
- * not count while it waits for the next call of a pipeline. Sees those of the same role only; a daemon that was merely
- * slow tries again. */
+ * not count while it waits for the next call of a pipeline. A transaction without a number has written and locked no
+ * row: its one large call may be on a slow way, unless it has the lock of the queue. Sees those of the same role only;
+ * a daemon that was merely slow tries again. */
 #define END_SILENT                                                                                                     \
-    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database()"                        \
+    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity AS a WHERE datname = current_database()"                   \
     " AND usename = current_user AND application_name = current_setting('application_name') AND state = 'active'"      \
-    " AND wait_event = 'ClientRead' AND query_start < clock_timestamp() - interval '20 s'"
+    " AND wait_event = 'ClientRead' AND query_start < clock_timestamp() - interval '20 s' AND (backend_xid IS NOT"     \
+    " NULL OR EXISTS (SELECT 1 FROM pg_locks AS l WHERE l.pid = a.pid AND locktype = 'advisory'))"
 
 /* Says that this node lives, and forgets those that have not for a day, and clients that have asked nothing for an
  * hour. */
@@ -128,8 +130,12 @@ static bool beat(postgresql_store *s, link_to *l)
     link_send(l, &c);
     link_send(l, &(call){.sql = "DELETE FROM uzawa.node WHERE seen < uzawa.moment() - 86400"});
     link_send(l, &(call){.sql = "DELETE FROM uzawa.rate WHERE at < uzawa.moment() - 3600"});
+    if (link_end(l) != STORE_OK)
+        return false;
+    link_begin(l, LINK_LAZY); /* by itself: a server may refuse this call, which is no reason not to live */
     link_send(l, &(call){.sql = END_SILENT});
-    return link_end(l) == STORE_OK;
+    link_end(l);
+    return !l->lost;
 }
 
 void postgresql_look_if_deaf(postgresql_store *s)
