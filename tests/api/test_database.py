@@ -4,6 +4,7 @@ import contextlib
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -141,6 +142,24 @@ def test_a_pooler_in_transaction_mode(s):
             check(time.monotonic() - begun < 40, time.monotonic() - begun)
             check(here.get(f"/v1/jobs/{long}").json["status"] == "dismissed")
             check(a.request("POST", "/v1/admin/check").json["whole"])
+
+
+def test_a_server_behind_a_pooler_stands_still(s):
+    """The pooler takes connections as before: to ask on a new one takes no longer than on an old one."""
+    name = server().database()
+    with pooler(server()) as folder, daemon(s.build, f"postgresql://postgres@/{name}?host={folder}&port=6432") as a:
+        a.start()
+        stopped = [server().process.pid, *(int(row[0]) for row in server().sql(
+            name, "SELECT pid FROM pg_stat_activity WHERE datname = current_database() AND pid <> pg_backend_pid()"))]
+        try:
+            for pid in stopped:
+                os.kill(pid, signal.SIGSTOP)
+            for _ in range(2):  # 5 s each; the second would be 45
+                check(a.request("GET", "/healthz", timeout=30).json["status"] == "store_unavailable")
+        finally:
+            for pid in stopped:
+                os.kill(pid, signal.SIGCONT)
+        wait_until(lambda: a.get("/healthz").json["status"] == "ok")
 
 
 if __name__ == "__main__":

@@ -33,16 +33,16 @@ bool link_address_fits(const char *address, char *message, size_t size)
 }
 
 /* A pooler tells its clients process numbers of its own, and hands the connection on after each transaction. */
-static bool find_out(link_to *l)
+static bool find_out(link_to *l, link_kind kind)
 {
-    link_begin(l, LINK_READ);
+    link_begin(l, kind == LINK_GLANCE ? LINK_GLANCE : LINK_READ);
     link_send(l, &(call){.sql = "SELECT pg_backend_pid()"});
     const bool good = link_end(l) == STORE_OK;
     l->direct = good && cell_integer(l->answers[0], 0, 0) == PQbackendPID(l->pg);
     return good;
 }
 
-bool link_open(link_to *l, const char *address)
+bool link_open(link_to *l, const char *address, link_kind kind)
 {
     /* Before what the address says: after so many seconds without a sign from the other machine it is gone. */
     static const char *const NAMES[] = {"connect_timeout",  "keepalives_idle",           "keepalives_interval",
@@ -53,7 +53,7 @@ bool link_open(link_to *l, const char *address)
     l->pg = PQconnectdbParams(NAMES, values, 1);
     const bool begun =
         l->pg && PQstatus(l->pg) == CONNECTION_OK && PQsetnonblocking(l->pg, 1) == 0 && PQenterPipelineMode(l->pg) == 1;
-    if (begun && find_out(l))
+    if (begun && find_out(l, kind))
         return true;
     char cause[LINK_CAUSE];
     snprintf(cause, sizeof cause, "%s", begun ? l->message : l->pg ? PQerrorMessage(l->pg) : "no memory");

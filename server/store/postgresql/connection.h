@@ -44,12 +44,6 @@ typedef struct {
  * does not show it then. */
 bool link_address_fits(const char *address, char *message, size_t size);
 
-/* NULL in pg on failure, and the cause with a remedy in message. Takes 5 s at most for each address. */
-bool link_open(link_to *l, const char *address);
-void link_close(link_to *l);
-/* Is the other side still there, as far as can be known without asking? */
-bool link_alive(link_to *l);
-
 /* A statement and its arguments $1, $2, ... in order; what they point to must live until it was sent. */
 #define CALL_ARGUMENTS 24
 typedef struct {
@@ -74,6 +68,14 @@ typedef enum {
     LINK_LAZY     /* may be lost with the server for a moment longer (engine.h: claim and renew) */
 } link_kind;
 #define LINK_GLANCE_S 5.0
+
+/* NULL in pg on failure, and the cause with a remedy in message. Takes 5 s at most for each address, and a pooler whose
+ * server does not answer as long as a transaction of this kind waits. */
+bool link_open(link_to *l, const char *address, link_kind kind);
+void link_close(link_to *l);
+/* Is the other side still there, as far as can be known without asking? */
+bool link_alive(link_to *l);
+
 void link_begin(link_to *l, link_kind kind);
 void link_send(link_to *l, const call *c);
 /* STORE_OK: all of it was carried out; else nothing was, or l->lost. Answers stay until the next link_begin. Codes that

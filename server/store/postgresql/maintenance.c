@@ -117,7 +117,7 @@ bool postgresql_check_file(const char *address, store_findings *out, char *messa
     *out = (store_findings){.findings = NULL};
     if (!link_address_fits(address, message, size))
         return false;
-    bool good = link_open(&l, address);
+    bool good = link_open(&l, address, LINK_READ);
     const int version = good ? schema_version(&l) : -1;
     if (version == 0)
         snprintf(l.message, sizeof l.message, "the database is empty: there is no job in it");

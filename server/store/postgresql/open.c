@@ -18,7 +18,7 @@
 /* ---- connections */
 
 /* Where the last attempt failed a moment ago nobody tries: all would wait for the same. */
-static void connect_link(postgresql_store *s, link_to *l)
+static void connect_link(postgresql_store *s, link_to *l, link_kind kind)
 {
     pthread_mutex_lock(&s->links_lock);
     const bool now = clock_seconds(CLOCK_MONOTONIC) >= s->connect_after;
@@ -26,7 +26,7 @@ static void connect_link(postgresql_store *s, link_to *l)
         snprintf(l->message, sizeof l->message, "%s", s->connect_cause);
     pthread_mutex_unlock(&s->links_lock);
     link_close(l);
-    const bool good = now && link_open(l, s->address);
+    const bool good = now && link_open(l, s->address, kind);
     pthread_mutex_lock(&s->links_lock);
     l->direct = l->direct && !s->pooled;
     if (good) {
@@ -41,23 +41,23 @@ static void connect_link(postgresql_store *s, link_to *l)
     pthread_mutex_unlock(&s->links_lock);
 }
 
-/* NULL: none was free within this time. */
-static link_to *take_within(postgresql_store *s, double seconds)
+/* For a transaction of this kind. NULL: none was free while one of LINK_GLANCE waits. */
+static link_to *take_for(postgresql_store *s, link_kind kind)
 {
-    const double until = clock_seconds(CLOCK_MONOTONIC) + seconds;
+    const double until = kind == LINK_GLANCE ? clock_seconds(CLOCK_MONOTONIC) + LINK_GLANCE_S : (double)INFINITY;
     pthread_mutex_lock(&s->links_lock);
     while (s->n_links_free == 0 && clock_wait(&s->link_free, &s->links_lock, until))
         ;
     link_to *l = s->n_links_free > 0 ? s->links_free[--s->n_links_free] : NULL;
     pthread_mutex_unlock(&s->links_lock);
     if (l && !link_alive(l))
-        connect_link(s, l);
+        connect_link(s, l, kind);
     return l;
 }
 
 link_to *postgresql_take(postgresql_store *s)
 {
-    return take_within(s, (double)INFINITY);
+    return take_for(s, LINK_READ);
 }
 
 store_status postgresql_give(postgresql_store *s, link_to *l, store_status status)
@@ -81,7 +81,7 @@ store_status postgresql_do(postgresql_store *s, link_kind kind, bool repeat, con
                            void *ctx)
 {
     for (int tries = 1;; tries++) {
-        link_to *l = take_within(s, kind == LINK_GLANCE ? LINK_GLANCE_S : (double)INFINITY);
+        link_to *l = take_for(s, kind);
         if (!l) {
             store_set_message(&s->base, "no connection to the database was free");
             return STORE_AWAY;

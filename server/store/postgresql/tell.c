@@ -178,7 +178,7 @@ static void *tell_loop(void *ctx)
     double next_look = 0.0, next_beat = 0.0, next_send = 0.0;
     while (has_more(t, &stop), !stop) {
         const double now = clock_seconds(CLOCK_MONOTONIC);
-        if (!l.pg && link_open(&l, s->address)) {
+        if (!l.pg && link_open(&l, s->address, LINK_READ)) {
             heard = false;
             if (link_script(&l, "LISTEN uzawa") != STORE_OK || !send_message(s, &l))
                 link_close(&l);
