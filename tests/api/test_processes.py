@@ -251,7 +251,7 @@ def test_a_prediction_is_nobodys_danger(s):
         for caller in reversed(callers):
             caller.close()
         wait_until(lambda: s.solvers() == own)
-        check(s.spent() - before < 1.2, s.spent() - before)  # seconds of processor; all of it takes 1.4
+        check(s.spent() - before < 0.5, s.spent() - before)  # seconds of processor; all of it takes 0.9, or 1.2
     check(len(s.events("prediction_died")) == 1)
     check(expect(s.post(SCENE, query="?validate=true"), 200).json["predicted"]["d"] == 660 and s.solvers() == own)
 
