@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "core/alloc.h"
+#include "core/reserve.h"
 #include "core/sanitized.h"
 #include "work/answers.h"
 #include "work/confine.h"
@@ -292,7 +293,8 @@ static int make_ready(solver *s)
     }
     while (poll(&socket, 1, 0) == 0 && uz_reserve_fill(s->reserve))
         ;
-    const bool large = uz_reserve_bytes(s->reserve) > 0; /* bodies are solved here */
+    /* bodies are solved here, those without a factor in the heap */
+    const bool large = uz_reserve_bytes(s->reserve) > 0 || uz_reserve_lent(s->reserve) > 0;
     const size_t share = reserve_share(s->cache_bytes) / 2, least = large ? share : 0;
     const struct mallinfo2 heap = mallinfo2();
     const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */

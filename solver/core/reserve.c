@@ -5,7 +5,8 @@
  * their pages here, up to a number of bytes. A new block is made by moving such pages to a range of addresses of its
  * own (mremap(2) moves entries of page tables, not bytes), so that nothing is too small or lies in the way; what is
  * missing is fresh. Fresh pages are touched ahead of their owner by a thread of the reserve's own, which asks the
- * kernel for them and writes nothing: before a block is taken, as far as it was announced, and while it is filled. */
+ * kernel for them and writes nothing: before a block is taken, as far as it was announced, and while it is filled. What
+ * no factor takes is moved to a free range of the heap in the same way. */
 #include "core/reserve.h"
 
 #include "core/alloc.h"
@@ -44,6 +45,7 @@ struct uz_reserve {
     bool has_helper, ends;
     char *ahead, *ahead_end; /* fresh pages of the block that was taken last */
     size_t expected;         /* bytes that shall be kept for a block to come */
+    size_t lent_bytes;       /* that the heap was given since the reserve was emptied */
 };
 
 uz_reserve *uz_reserve_new(size_t most, size_t ready)
@@ -104,14 +106,20 @@ static bool move_kept(uz_reserve *reserve, block *b)
     return true;
 }
 
-static void unmap_pieces(piece *list)
+static void free_list(piece *list)
 {
     while (list) {
         piece *next = list->next;
-        munmap(list->at, list->bytes);
         free(list);
         list = next;
     }
+}
+
+static void unmap_pieces(piece *list)
+{
+    for (const piece *part = list; part; part = part->next)
+        munmap(part->at, part->bytes);
+    free_list(list);
 }
 
 size_t uz_reserve_size(uz_reserve *reserve, const void *block_at)
@@ -257,11 +265,7 @@ void *uz_reserve_take(uz_reserve *reserve, size_t bytes)
     if (made)
         return b->at;
     munmap(b->at, bytes); /* its pieces too */
-    while (b->pieces) {
-        piece *next = b->pieces->next;
-        free(b->pieces);
-        b->pieces = next;
-    }
+    free_list(b->pieces);
     free(b);
     return NULL;
 }
@@ -298,35 +302,41 @@ bool uz_reserve_fill(uz_reserve *reserve)
     return bytes > 0 && keep_fresh(reserve, bytes) && more;
 }
 
-void uz_reserve_give_back(uz_reserve *reserve, size_t bytes)
+void uz_reserve_give_to_heap(uz_reserve *reserve, size_t bytes)
 {
-    piece *out = NULL;
+    block whole = {.at = NULL};
     pthread_mutex_lock(&reserve->mutex);
     reserve->expected = 0;
-    while (reserve->kept && bytes > 0) {
-        piece *first = reserve->kept;
-        if (first->bytes > bytes) { /* whole pages of its end */
-            const size_t part = bytes / UZ_HUGE_PAGE * UZ_HUGE_PAGE;
-            first->bytes -= part;
-            reserve->kept_bytes -= part;
-            munmap(first->at + first->bytes, part);
-            break;
-        }
-        reserve->kept = first->next;
-        reserve->kept_bytes -= first->bytes;
-        bytes -= first->bytes;
-        first->next = out;
-        out = first;
-    }
+    whole.bytes = (bytes < reserve->kept_bytes ? bytes : reserve->kept_bytes) / UZ_HUGE_PAGE * UZ_HUGE_PAGE;
+    const bool some = whole.bytes > 0;
+    whole.at = some ? uz_malloc_huge(whole.bytes) : NULL; /* and freed with other pages: nobody reads it */
+    const bool made = !some || (whole.at && move_kept(reserve, &whole));
     if (reserve->largest > reserve->kept_bytes)
         reserve->largest = reserve->kept_bytes;
+    reserve->lent_bytes += made ? whole.bytes : 0;
     pthread_mutex_unlock(&reserve->mutex);
-    unmap_pieces(out);
+    free_list(whole.pieces);
+    free(whole.at);
+    if (!made)
+        uz_reserve_empty(reserve);
 }
 
 void uz_reserve_empty(uz_reserve *reserve)
 {
-    uz_reserve_give_back(reserve, SIZE_MAX);
+    pthread_mutex_lock(&reserve->mutex);
+    piece *out = reserve->kept;
+    reserve->kept = NULL;
+    reserve->expected = reserve->largest = reserve->kept_bytes = reserve->lent_bytes = 0;
+    pthread_mutex_unlock(&reserve->mutex);
+    unmap_pieces(out);
+}
+
+size_t uz_reserve_lent(uz_reserve *reserve)
+{
+    pthread_mutex_lock(&reserve->mutex);
+    const size_t bytes = reserve->lent_bytes;
+    pthread_mutex_unlock(&reserve->mutex);
+    return bytes;
 }
 
 size_t uz_reserve_bytes(uz_reserve *reserve)

@@ -10,9 +10,12 @@ void uz_reserve_start(uz_reserve *reserve);
 /* A block of some `bytes` is going to be taken: their pages are made ready meanwhile, as far as `ready` of
  * uz_reserve_new allows. */
 void uz_reserve_expect(uz_reserve *reserve, size_t bytes);
-/* So many bytes are going to be allocated elsewhere, and no block is taken meanwhile: as many of those that are kept go
- * back to the system, and are not made ready again before a block has taken as much. */
-void uz_reserve_give_back(uz_reserve *reserve, size_t bytes);
+/* So many bytes are going to be allocated by malloc, and no block is taken meanwhile: as many of those that are kept
+ * become memory of the heap, by moving their pages there, and are not made ready again before a block has taken as
+ * much. Where that fails all that is kept goes back to the system. */
+void uz_reserve_give_to_heap(uz_reserve *reserve, size_t bytes);
+/* How many it was given since the reserve was emptied last: for bodies without a factor. */
+size_t uz_reserve_lent(uz_reserve *reserve);
 /* An uninitialized block, on a huge page boundary; NULL: no memory. */
 void *uz_reserve_take(uz_reserve *reserve, size_t bytes);
 /* Of a block that was taken; 0: it was not. */

@@ -61,7 +61,7 @@ void uz_expect_factor(const uz_csc *K)
 void uz_factor_expect_none(size_t bytes)
 {
     if (reserve)
-        uz_reserve_give_back(reserve, bytes);
+        uz_reserve_give_to_heap(reserve, bytes);
 }
 
 void uz_factor_use_huge_pages(void)

@@ -1,11 +1,15 @@
 /* The reserve of touched pages: blocks are whole and their own, pages of a freed block serve the next one, and no more
  * is kept than was allowed.
- * in the ordinary build too, pages_of: a sanitizer has a heap of its own */
+ * in the ordinary build too, pages_: a sanitizer has a heap of its own */
 #include "core/reserve.h"
+#include "core/alloc.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "sanitized.h"
 
+#include <limits.h>
+#include <malloc.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -91,7 +95,8 @@ TEST(what_is_kept_is_left_to_others)
     unsigned char *a = uz_reserve_take(reserve, 10 * MB), *b = uz_reserve_take(reserve, 30 * MB);
     CHECK(a && b && uz_reserve_give(reserve, a) && uz_reserve_give(reserve, b));
     CHECK(uz_reserve_bytes(reserve) == 40 * MB);
-    uz_reserve_give_back(reserve, 13 * MB); /* whole pages of it */
+    uz_reserve_give_to_heap(reserve, 13 * MB); /* whole pages of it */
+    CHECK(uz_reserve_lent(reserve) == 12 * MB);
     CHECK(uz_reserve_bytes(reserve) == 28 * MB);
     CHECK(!uz_reserve_fill(reserve) && uz_reserve_bytes(reserve) == 28 * MB); /* so much is enough now */
     a = uz_reserve_take(reserve, 32 * MB);
@@ -101,8 +106,10 @@ TEST(what_is_kept_is_left_to_others)
     while (uz_reserve_fill(reserve))
         ;
     CHECK(uz_reserve_bytes(reserve) == 32 * MB); /* as much as a block has taken since */
-    uz_reserve_give_back(reserve, SIZE_MAX);
-    CHECK(uz_reserve_bytes(reserve) == 0);
+    uz_reserve_give_to_heap(reserve, SIZE_MAX);
+    CHECK(uz_reserve_bytes(reserve) == 0 && uz_reserve_lent(reserve) == 44 * MB);
+    uz_reserve_empty(reserve);
+    CHECK(uz_reserve_lent(reserve) == 0);
     uz_reserve_free(reserve);
 }
 
@@ -142,6 +149,40 @@ TEST(pages_are_there_before_they_are_touched)
         CHECK(uz_reserve_give(reserve, a));
         uz_reserve_empty(reserve);
     }
+    uz_reserve_free(reserve);
+}
+
+/* As in processes of the daemon, whose heap is one and keeps what is freed. */
+TEST(pages_that_the_heap_is_given_serve_it)
+{
+    mallopt(M_MMAP_MAX, 0);
+    mallopt(M_TRIM_THRESHOLD, INT_MAX);
+    uz_reserve *reserve = uz_reserve_new(64 * MB, 0);
+    unsigned char *a = uz_reserve_take(reserve, 20 * MB), *b = uz_reserve_take(reserve, 30 * MB);
+    CHECK(a && b);
+    write_all(a, 20 * MB, 1);
+    write_all(b, 30 * MB, 2);
+    CHECK(uz_reserve_give(reserve, a) && uz_reserve_give(reserve, b));
+    uz_reserve_give_to_heap(reserve, SIZE_MAX);
+    CHECK(uz_reserve_bytes(reserve) == 0 && uz_reserve_lent(reserve) == 50 * MB);
+    unsigned char *all = uz_malloc_huge(30 * MB);
+    const bool there = is_there(all, 30 * MB); /* before anybody writes */
+    unsigned char *zero = calloc(1, 2 * MB);
+    CHECK(SANITIZED || there);
+    CHECK(all && zero && has_only(zero, 2 * MB, 0)); /* what is not fresh is cleared */
+    write_all(all, 30 * MB, 3);
+    unsigned char *more = uz_malloc_huge(30 * MB); /* beyond them the heap grows as ever */
+    CHECK(more != NULL);
+    write_all(more, 30 * MB, 4);
+    CHECK(has_only(all, 30 * MB, 3) && has_only(zero, 2 * MB, 0));
+    free(all);
+    free(zero);
+    free(more);
+    malloc_trim(0);
+    CHECK((all = uz_malloc_huge(80 * MB)) != NULL);
+    write_all(all, 80 * MB, 5);
+    CHECK(has_only(all, 80 * MB, 5));
+    free(all);
     uz_reserve_free(reserve);
 }
 
