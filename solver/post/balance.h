@@ -89,6 +89,8 @@ enum { UZ_MOST_COMPARED = 20000 };
 #define UZ_WARN_SLIDING "sliding"
 #define UZ_WARN_COARSE  "coarse_contact"
 #define UZ_WARN_OVERLAP "overlap"
+/* Has a warning with this code been given? NULL has none. */
+bool uz_is_warned(const uz_evaluation *of, const char *code);
 
 /* *sliding: uz_geometry.sliding of an answer with its contacts as they are before anything moves; approach: of
  * overlap.h. NaN of a model at a place. */

@@ -583,13 +583,20 @@ static uz_status look_at_triangles(const doubts *d, int64_t k, uz_error *err)
     return status;
 }
 
+bool uz_is_warned(const uz_evaluation *of, const char *code)
+{
+    for (int i = 0; of && i < of->n_warnings; i++)
+        if (strcmp(of->warnings[i].code, code) == 0)
+            return true;
+    return false;
+}
+
 /* Have warnings with one of these codes been given? */
 static bool is_said(const uz_evaluation *out, const char *const code[], int codes)
 {
-    for (int i = 0; i < out->n_warnings; i++)
-        for (int j = 0; j < codes; j++)
-            if (strcmp(out->warnings[i].code, code[j]) == 0)
-                return true;
+    for (int j = 0; j < codes; j++)
+        if (uz_is_warned(out, code[j]))
+            return true;
     return false;
 }
 

@@ -2,8 +2,8 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "finite/mesh_error.h"
 #include "core/vector3.h"
+#include "finite/mesh_error.h"
 #include "obstacle/obstacle.h"
 #include "run/results.h"
 #include "scene/bisect.h"

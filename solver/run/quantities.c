@@ -520,14 +520,11 @@ static uz_status estimate(uz_quantity_found *out, adjoint *x, const uz_functiona
 /* Is a contact narrower than the mesh can tell? Of large deformation no warning says so. */
 static uz_status find_coarse(adjoint *x, uz_error *err)
 {
-    const uz_evaluation *e = x->answer->evaluation;
     uz_coarse_contact found = {.contact = -1};
     uz_status status = UZ_OK;
     if (x->work->place)
         status = uz_find_coarse_contact(&found, x->work->model, x->work->scene, x->answer->u, x->answer->r, err);
-    x->coarse = found.contact >= 0;
-    for (int k = 0; k < e->n_warnings; k++)
-        x->coarse = x->coarse || strcmp(e->warnings[k].code, UZ_WARN_COARSE) == 0;
+    x->coarse = found.contact >= 0 || uz_is_warned(x->answer->evaluation, UZ_WARN_COARSE);
     return status;
 }
 
@@ -535,13 +532,11 @@ static uz_status find_coarse(adjoint *x, uz_error *err)
 static const char *why_none(const adjoint *x)
 {
     const uz_quantity_work *work = x->work;
-    const uz_evaluation *e = x->answer->evaluation;
     const uz_summary *s = &x->answer->summary;
-    bool overlap = work->place && s->finite.least_gap < -ROUNDING * work->model->mesh.extent;
+    const bool overlap = (work->place && s->finite.least_gap < -ROUNDING * work->model->mesh.extent) ||
+                         uz_is_warned(x->answer->evaluation, UZ_WARN_OVERLAP);
     if (x->coarse)
         return "the mesh can't tell how wide the contact is (coarse_contact)";
-    for (int k = 0; k < e->n_warnings; k++)
-        overlap = overlap || strcmp(e->warnings[k].code, UZ_WARN_OVERLAP) == 0;
     if (overlap && s->active == 0)
         return "surfaces stand in each other, and no row of a contact presses";
     return work->place ? work->place->why : work->dual ? NULL : "no rows are proved to hold the body";

@@ -100,10 +100,7 @@ void uz_pass_unheld(uz_status *status, int64_t *unheld, uz_error *first, const u
 
 bool uz_is_pressed_apart(const uz_summary *s)
 {
-    bool so = false;
-    for (int i = 0; s->evaluation && i < s->evaluation->n_warnings; i++)
-        so = so || strcmp(s->evaluation->warnings[i].code, UZ_WARN_APART) == 0;
-    return so;
+    return uz_is_warned(s->evaluation, UZ_WARN_APART);
 }
 
 void uz_judge_contact(uz_result *result)
