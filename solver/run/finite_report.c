@@ -292,14 +292,15 @@ static void compare_forces(double *off, double *most, const uz_resultant *here, 
 }
 
 /* The largest force that acts where resultants do not tell: what presses a ring all around has none, nor have supports
- * that bend or twist a body; a moment counts as the force that has it over the body's size. */
+ * that bend or twist a body. Of what presses from all sides half comes from either side, which is less than what a side
+ * alone has as its resultant; a moment counts as the force that has it over the body's size. */
 static double force_within(const uz_evaluation *e, const uz_body_model *model)
 {
     const double size = uz_mesh_size(&model->mesh);
     double middle[3], most = 0;
     uz_mesh_middle(middle, &model->mesh);
     for (int64_t i = 0; i < e->n_contacts; i++)
-        most = fmax(most, e->totals[i].normal_force);
+        most = fmax(most, 0.5 * e->totals[i].normal_force);
     for (int64_t i = 0; i < e->n_supports && model->kind != UZ_AXISYMMETRIC; i++) {
         double moment[3];
         uz_cross3(moment, middle, e->supports[i].force);
