@@ -49,12 +49,18 @@ bool uz_may_be_compared(const uz_scene *scene, const uz_body_model *model)
            (scene->kinematics == UZ_KINEMATICS_FINITE || scene->kinematics == UZ_KINEMATICS_AUTO);
 }
 
-/* Of an answer to the equations. */
+/* The equations were solved well enough to tell about the model, of which what the mesh is short of says nothing. */
+static bool is_answer(const uz_summary *s)
+{
+    return s->outcome == UZ_CONVERGED || s->outcome == UZ_MESH_LIMIT ||
+           (s->outcome == UZ_PRECISION_LIMIT && s->certificate.relative_error <= COMPARED_TO);
+}
+
 static bool is_asked(const uz_result *result, const uz_problem *one, bool own_laws)
 {
     const uz_summary *s = &result->summary;
     const uz_evaluation *e = result->evaluation;
-    if (one->kind != UZ_PROBLEM_SCENE || one->scene.kinematics != UZ_KINEMATICS_AUTO || !e)
+    if (one->kind != UZ_PROBLEM_SCENE || one->scene.kinematics != UZ_KINEMATICS_AUTO || !e || !is_answer(s))
         return false;
     if (own_laws)
         return e->nonlinear > UZ_SURELY_SMALL || s->geometry.sliding > SLIDES;
@@ -198,10 +204,7 @@ uz_status uz_weigh_deformation(uz_result **result, const uz_problem *one, const 
                                const uz_hooks *hooks, double started, uz_error *err)
 {
     const bool own_laws = one->kind == UZ_PROBLEM_SCENE && uz_has_finite_law(&one->scene);
-    const uz_outcome outcome = (*result)->summary.outcome;
-    const bool precise = outcome == UZ_PRECISION_LIMIT && (*result)->summary.certificate.relative_error <= COMPARED_TO;
-    /* what the mesh is short of says nothing of the model */
-    if ((outcome != UZ_CONVERGED && outcome != UZ_MESH_LIMIT && !precise) || !is_asked(*result, one, own_laws))
+    if (!is_asked(*result, one, own_laws))
         return UZ_OK;
     if (own_laws)
         return choose(result, one, settings, hooks, started, err);
@@ -225,10 +228,8 @@ static uz_status weigh_chosen(bool *compared, uz_result *result, const uz_proble
     uz_problem one = uz_problem_of_case(problem, i);
     uz_settings coarse = uz_settings_default();
     uz_result *large = NULL;
-    const uz_outcome outcome = result->summary.outcome;
     *compared = false;
-    /* what the mesh is short of says nothing of the model */
-    if ((outcome != UZ_CONVERGED && outcome != UZ_MESH_LIMIT) || !is_asked(result, &one, own_laws))
+    if (!is_asked(result, &one, own_laws))
         return UZ_OK;
     if (one.scene.box.automatic)
         memcpy(one.scene.box.cells, result->grids->cells, sizeof one.scene.box.cells);

@@ -468,6 +468,12 @@ def test_the_linear_law_is_compared_on_a_mesh_that_is_chosen(s):
                          "solver": {"accuracy": {"total": 0.01}}}, "summary")[1]["summary"]
     check(limited["outcome"] == "mesh_limit" and 0.06 < limited["small_deformation"]["error"] < 0.08, limited)
     check(limited["warnings"][-1]["code"] == "large_deformation", limited["warnings"])
+    # nor does more than double precision holds
+    for mesh in {"refine": "auto"}, {}:
+        beam["problem"]["mesh"] = {"box": {"size": [40, 10], "cells": [20, 5]}, **mesh}
+        precise = answer(s, {**beam, "solver": {"accuracy": {"total": 1e-15}}}, "summary")[1]["summary"]
+        check(precise["outcome"] == "precision_limit" and 0.06 < precise["small_deformation"]["error"] < 0.08, precise)
+        check(precise["warnings"][-1]["code"] == "large_deformation", precise["warnings"])
 
 
 def test_what_is_compared_does_not_depend_on_how_a_body_stands(s):
