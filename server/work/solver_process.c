@@ -24,7 +24,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -298,11 +297,10 @@ static int make_ready(solver *s)
     const size_t share = reserve_share(s->cache_bytes) / 2, least = large ? share : 0;
     const struct mallinfo2 heap = mallinfo2();
     const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */
-    void *block = NULL;
+    void *block;
     if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
         malloc_trim(0);
-    else if (known && heap.fordblks < least / 2 && posix_memalign(&block, UZ_HUGE_PAGE, least) == 0) {
-        madvise(block, least, MADV_HUGEPAGE);
+    else if (known && heap.fordblks < least / 2 && (block = uz_malloc_huge(least)) != NULL) {
         for (size_t at = 0; at < least; at += SMALL_PAGE)
             ((volatile char *)block)[at] = 0;
         free(block);
