@@ -32,6 +32,12 @@ enum { MAX_PASSES = 20, FEW_ROWS = 1024, IN_VAIN = 4096 };
 #define LEAST_GAIN 0.5
 enum { PATIENCE = 3 };
 
+/* Where solves are not exact: a correction that takes an answer to what is asked is as good as this part of that. Its
+ * own error is small in the norm of the body as the rows hold it, and up to some hundred times larger in that of the
+ * whole body, where this is long. */
+#define SPARE     1e-3
+#define LEAST_AIM 1e-10
+
 typedef struct {
     uz_run *run;
     uz_csc Nt;
@@ -43,8 +49,8 @@ typedef struct {
     bool contradictory;   /* the rows of the last correction are, `ray` says why */
 } refinement;
 
-/* c and s for e and f. */
-static uz_status correct(refinement *x, uz_error *err)
+/* c and s for e and f. error: of the answer that is corrected, relative. */
+static uz_status correct(refinement *x, double error, uz_error *err)
 {
     const uz_run *run = x->run;
     const uz_dual *dual = run->work.dual->dual;
@@ -58,8 +64,9 @@ static uz_status correct(refinement *x, uz_error *err)
     uz_status status = uz_dual_load_create(&correction, run->asked->setup->dual,
                                            uz_setup_K(run->asked->setup, run->asked->problem), x->e, x->f, err);
     uz_stop stop = {run->asked->hooks, run->asked->deadline};
+    const double aim = fmax(LEAST_AIM, SPARE * run->work.requested / error);
     if (status == UZ_OK)
-        status = uz_dual_load_aim(correction, NAN, &stop, err);
+        status = uz_dual_load_aim(correction, exchange ? NAN : aim, &stop, err);
     if (status == UZ_OK && exchange) {
         uz_exchange_end ended;
         int64_t steps = INT64_MAX;
@@ -68,6 +75,7 @@ static uz_status correct(refinement *x, uz_error *err)
         x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_UNDECIDED;
     } else if (status == UZ_OK) { /* rows that can't depend on each other, or are too many: those that press stay */
         uz_active_end ended;
+        correction->equations = true; /* they bear a correction, which may pull */
         status = uz_dual_load_solve_active(correction, &ended, x->s, x->g, x->active, err);
         for (int64_t i = 0; i < run->m; i++)
             x->s[i] = ended == UZ_ACTIVE_SOLVED ? x->s[i] : 0.0;
@@ -95,7 +103,7 @@ static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
     }
     run->work.it.law->kind->active(run->work.it.law, x->active, latest->r, run->m); /* the rows that press */
     if (status == UZ_OK)
-        status = correct(x, err);
+        status = correct(x, latest->certificate.relative_error, err);
     uz_stop stop = {run->asked->hooks, run->asked->deadline};
     if (status != UZ_OK || x->contradictory || uz_stop_is_due(&stop)) /* half a correction is none */
         return status;
@@ -147,18 +155,23 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
         status = uz_answer_allocate(&latest, run->d, run->m, err);
     if (status == UZ_OK)
         copy_answer(&latest, &run->answer, run);
+    /* What no bound is known of goes on while a factor solves for it; other solves leave as much as there was. */
+    const bool exact = run->work.dual->dual->can->needs_factor;
     for (int pass = 0, idle = 0;
          status == UZ_OK && idle < PATIENCE && !x.contradictory && pass < MAX_PASSES && is_worth_it(run); pass++) {
-        double before = run->answer.certificate.relative_error;
+        const double before = run->answer.certificate.relative_error, left = latest.certificate.residual.total;
         status = refine_once(&x, &latest, err);
-        bool unbounded = isinf(before), better = latest.certificate.relative_error < before;
+        const bool unbounded = isinf(before), better = latest.certificate.relative_error < before;
         if (status == UZ_OK && (better || unbounded)) {
             copy_answer(&run->answer, &latest, run);
             run->result->summary.refinements += better;
         }
         if (run->work.end == UZ_END_NEXT && pass > 0 && isinf(run->answer.certificate.relative_error))
             break; /* the guess is not nearly right, and something else is there to be tried */
-        idle = unbounded || run->answer.certificate.relative_error < LEAST_GAIN * before ? 0 : idle + 1;
+        const bool gained = unbounded ? exact || latest.certificate.residual.total < LEAST_GAIN * left ||
+                                            isfinite(latest.certificate.relative_error)
+                                      : run->answer.certificate.relative_error < LEAST_GAIN * before;
+        idle = gained ? 0 : idle + 1;
     }
     if (x.contradictory && isinf(run->answer.certificate.relative_error)) {
         memcpy(run->work.it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
