@@ -36,19 +36,9 @@ typedef struct {
     int64_t count, row[MOST_TOGETHER];
     mpq_t y[MOST_TOGETHER], w[MOST_TOGETHER], A[MOST_TOGETHER][MOST_TOGETHER + 1];
     mpq_t a, b, gap, step, part, own; /* work */
-    double work;                      /* left to spend */
+    mpz_t sum, term;
+    double work; /* left to spend */
 } settle;
-
-/* sum += x y */
-static void add_product(settle *s, mpq_t sum, double x, double y)
-{
-    if (x == 0.0 || y == 0.0)
-        return;
-    mpq_set_d(s->a, x);
-    mpq_set_d(s->b, y);
-    mpq_mul(s->a, s->a, s->b);
-    mpq_add(sum, sum, s->a);
-}
 
 /* The gap of row i at the given point, without delta. */
 static void take_gap_at(mpq_t gap, mpq_t term, const uz_row_settle *in, int64_t i)
@@ -61,22 +51,14 @@ static void take_gap_at(mpq_t gap, mpq_t term, const uz_row_settle *in, int64_t 
     }
 }
 
-/* Is u + c, without delta, open at row i? The sum of integers times powers of two, exactly. */
-static bool is_open(const uz_row_settle *in, int64_t i)
+/* N (u + c) - h of row i, without delta: a sum of integers times powers of two, which is an integer times the power of
+ * two that is returned. */
+static int add_up(mpz_t sum, mpz_t term, const uz_row_settle *in, int64_t i)
 {
     const uz_csc *Nt = in->Nt;
-    if (in->at) {
-        mpq_t gap, room;
-        mpq_inits(gap, room, NULL);
-        take_gap_at(gap, room, in, i);
-        const bool open = mpq_sgn(gap) >= 0;
-        mpq_clears(gap, room, NULL);
-        return open;
-    }
     const int64_t first = Nt->ptr[i], n = 2 * (Nt->ptr[i + 1] - first) + 1;
     int least = INT_MAX;
-    mpz_t sum, term;
-    mpz_inits(sum, term, NULL);
+    mpz_set_ui(sum, 0);
     for (int pass = 0; pass < 2; pass++)
         for (int64_t k = 0; k < n; k++) {
             int of_x, of_y;
@@ -97,29 +79,51 @@ static bool is_open(const uz_row_settle *in, int64_t i)
             else
                 mpz_addmul_ui(sum, term, (unsigned long)digits);
         }
-    const bool open = mpz_sgn(sum) <= 0; /* of N (u + c) - h */
+    return least < INT_MAX ? least - 2 * DBL_MANT_DIG : 0;
+}
+
+/* Is u + c, without delta, open at row i? */
+static bool is_open(const uz_row_settle *in, int64_t i)
+{
+    if (in->at) {
+        mpq_t gap, room;
+        mpq_inits(gap, room, NULL);
+        take_gap_at(gap, room, in, i);
+        const bool open = mpq_sgn(gap) >= 0;
+        mpq_clears(gap, room, NULL);
+        return open;
+    }
+    mpz_t sum, term;
+    mpz_inits(sum, term, NULL);
+    add_up(sum, term, in, i);
+    const bool open = mpz_sgn(sum) <= 0;
     mpz_clears(sum, term, NULL);
     return open;
 }
 
-/* s->gap: of row i at u + c + delta. */
+/* s->gap: of row i at u + c + delta. A sum of rationals takes a greatest common divisor, which is left to those rows
+ * and dofs that were moved. */
 static void take_gap(settle *s, int64_t i)
 {
     const uz_row_settle *in = s->in;
-    mpq_set_ui(s->gap, 0, 1);
-    if (in->at)
+    if (in->at) {
         take_gap_at(s->gap, s->a, in, i);
-    else
-        add_product(s, s->gap, 1.0, in->h[i]);
+    } else {
+        const int exponent = add_up(s->sum, s->term, in, i);
+        mpq_set_z(s->gap, s->sum);
+        mpq_neg(s->gap, s->gap);
+        if (exponent < 0)
+            mpq_div_2exp(s->gap, s->gap, (mp_bitcnt_t)-exponent);
+        else
+            mpq_mul_2exp(s->gap, s->gap, (mp_bitcnt_t)exponent);
+    }
     for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
         const int64_t j = in->Nt->idx[k];
-        if (!in->at) {
-            add_product(s, s->gap, -in->Nt->val[k], in->u[j]);
-            add_product(s, s->gap, -in->Nt->val[k], in->c[j]);
+        if (mpq_sgn(s->delta[j]) != 0) {
+            mpq_set_d(s->b, -in->Nt->val[k]);
+            mpq_mul(s->b, s->b, s->delta[j]);
+            mpq_add(s->gap, s->gap, s->b);
         }
-        mpq_set_d(s->b, -in->Nt->val[k]);
-        mpq_mul(s->b, s->b, s->delta[j]);
-        mpq_add(s->gap, s->gap, s->b);
         s->work -= work_of(mpz_size(mpq_denref(s->gap)));
     }
 }
@@ -293,6 +297,7 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
             mpq_init(s->A[k][l]);
     }
     mpq_inits(s->a, s->b, s->gap, s->step, s->part, s->own, NULL);
+    mpz_inits(s->sum, s->term, NULL);
     /* with each row what that takes along; the rows moved before are like any other */
     for (int64_t k = 0; settled && k < n; k++) {
         s->count = s->n_near = 0;
@@ -322,6 +327,7 @@ static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
             mpq_clear(s->A[k][l]);
     }
     mpq_clears(s->a, s->b, s->gap, s->step, s->part, s->own, NULL);
+    mpz_clears(s->sum, s->term, NULL);
     return settled;
 }
 
