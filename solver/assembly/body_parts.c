@@ -71,8 +71,7 @@ static void hold_row(uz_parts *parts, uz_part *p, const double row[UZ_MOTIONS])
     uz_extend_rows(p->held, &p->rank, allowed);
 }
 
-/* The direction n at x is held. */
-static void hold_at(uz_parts *parts, uz_part *p, const double *x, const double *n)
+void uz_hold_part_at(uz_parts *parts, uz_part *p, const double *x, const double *n)
 {
     double at[3], row[UZ_MOTIONS] = {0};
     if (p->rank == parts->motions)
@@ -85,7 +84,7 @@ static void hold_at(uz_parts *parts, uz_part *p, const double *x, const double *
 
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
 {
-    hold_at(parts, &parts->list[parts->of[node]], mesh->xyz + node * mesh->dim, n);
+    uz_hold_part_at(parts, &parts->list[parts->of[node]], mesh->xyz + node * mesh->dim, n);
 }
 
 /* The motions of rigid groups that supports prescribe. */
@@ -102,7 +101,7 @@ static void hold_rigid(uz_parts *parts, const uz_body_model *model)
                 continue;
             row[c < dim ? c : dim == 2 ? 5 : c] = 1;
             if (c < dim)
-                hold_at(parts, p, group->point, row);
+                uz_hold_part_at(parts, p, group->point, row);
             else
                 hold_row(parts, p, row);
         }
@@ -147,21 +146,28 @@ void uz_parts_clear(uz_parts *parts)
     free(parts->of);
 }
 
-uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
+void uz_parts_begin(uz_parts *parts, const uz_body_model *model)
 {
-    static const double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const uz_mesh *mesh = &model->mesh;
-    *parts = (uz_parts){.dim = mesh->dim};
     static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
     const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
+    *parts = (uz_parts){.dim = model->mesh.dim};
     const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
     parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
     for (int k = 0; k < parts->motions; k++)
         parts->unit[k][which[k]] = 1;
-    parts->of = uz_alloc(mesh->n_nodes, sizeof *parts->of);
-    parts->count = parts->of ? uz_mesh_number_parts(parts->of, mesh) : -1;
-    if (parts->count > 0 && (model->n_rigid > 0 || model->tied.share.ptr) && !join_parts(parts, model))
-        parts->count = -1;
+}
+
+void uz_part_reach(uz_part *p, const uz_mesh *mesh, int64_t node)
+{
+    for (int c = 0; c < mesh->dim; c++) {
+        const double at = mesh->xyz[node * mesh->dim + c];
+        p->low[c] = at < p->low[c] ? at : p->low[c];
+        p->high[c] = at > p->high[c] ? at : p->high[c];
+    }
+}
+
+uz_status uz_list_parts(uz_parts *parts, const uz_mesh *mesh, uz_error *err)
+{
     parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
     if (!parts->list)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)mesh->n_nodes);
@@ -173,12 +179,15 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
     for (int64_t a = mesh->n_nodes - 1; a >= 0; a--) {
         uz_part *p = &parts->list[parts->of[a]];
         p->node = a;
-        for (int c = 0; c < mesh->dim; c++) {
-            const double at = mesh->xyz[a * mesh->dim + c];
-            p->low[c] = at < p->low[c] ? at : p->low[c];
-            p->high[c] = at > p->high[c] ? at : p->high[c];
-        }
+        uz_part_reach(p, mesh, a);
     }
+    return UZ_OK;
+}
+
+void uz_hold_by_supports(uz_parts *parts, const uz_body_model *model)
+{
+    static const double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const uz_mesh *mesh = &model->mesh;
     /* a held dof is a direction that supports hold; a spring holds its axes as stiffness */
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
         const bool springs = model->spring && model->spring[i] > 0;
@@ -192,7 +201,20 @@ uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *e
             uz_hold_part(parts, mesh, a, axis[c]);
     }
     hold_rigid(parts, model);
-    return UZ_OK;
+}
+
+uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    uz_parts_begin(parts, model);
+    parts->of = uz_alloc(mesh->n_nodes, sizeof *parts->of);
+    parts->count = parts->of ? uz_mesh_number_parts(parts->of, mesh) : -1;
+    if (parts->count > 0 && (model->n_rigid > 0 || model->tied.share.ptr) && !join_parts(parts, model))
+        parts->count = -1;
+    const uz_status status = uz_list_parts(parts, mesh, err);
+    if (status == UZ_OK)
+        uz_hold_by_supports(parts, model);
+    return status;
 }
 
 /* Translations are orthogonal to what is held and to every rotation; the rest is left for motions that rotate. */

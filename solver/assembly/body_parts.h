@@ -30,6 +30,12 @@ typedef struct {
 /* The parts, and what supports and springs hold of them. uz_parts_clear also after a failure. */
 uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err);
 void uz_parts_clear(uz_parts *parts);
+/* Its steps: the motions of such a body; with of and count, the parts as they lie; what supports and springs hold. */
+void uz_parts_begin(uz_parts *parts, const uz_body_model *model);
+uz_status uz_list_parts(uz_parts *parts, const uz_mesh *mesh, uz_error *err);
+void uz_hold_by_supports(uz_parts *parts, const uz_body_model *model);
+/* A part reaches as far as this node. */
+void uz_part_reach(uz_part *p, const uz_mesh *mesh, int64_t node);
 
 double uz_part_size(const uz_part *p);
 
@@ -38,7 +44,8 @@ double uz_part_size(const uz_part *p);
 bool uz_reject_rows(double *v, const double *basis, int64_t rank, int64_t n);
 /* Appends v to the orthonormal rows, of which there is room for UZ_MOTIONS, unless they span it already. */
 void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS]);
-/* The direction n (dim) at a node is held. */
+/* The direction n (dim) is held, at x (dim) or at a node, whose part it is. */
+void uz_hold_part_at(uz_parts *parts, uz_part *p, const double *x, const double *n);
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n);
 /* Place of a node in its part, from the centre, over the size: a motion q moves it by q[0..2] + q[3..5] x place. */
 void uz_place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node);
