@@ -28,8 +28,12 @@ uz_status uz_build_cells(bool *made, uz_body_model *model, const uz_scene *scene
     if (!brick)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
     double xyz[3 * UZ_ELEMENT_NODES];
-    memcpy(brick->cells, scene->box.cells, sizeof brick->cells);
-    memcpy(brick->cell, model->mesh.cell, sizeof brick->cell);
+    brick->axes = model->mesh.dim;
+    for (int c = 0; c < brick->axes; c++) {
+        const int axis = uz_brick_axis_of(brick->axes, c);
+        brick->cells[axis] = scene->box.cells[c];
+        brick->cell[axis] = model->mesh.cell[c];
+    }
     brick->n_nodes = model->mesh.n_nodes;
     brick->d = model->d;
     brick->dof = model->dof;

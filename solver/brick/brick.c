@@ -22,37 +22,39 @@ const int uz_brick_corner[UZ_BRICK_NODES][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0},
 bool uz_brick_stiffness(double *ke, const uz_brick *brick, const double size[3])
 {
     double xyz[3 * UZ_BRICK_NODES];
-    for (int a = 0; a < UZ_BRICK_NODES; a++)
-        for (int c = 0; c < 3; c++)
-            xyz[3 * a + c] = uz_brick_corner[a][c] ? size[c] : 0.0;
+    const int axes = brick->axes, dofs = uz_brick_dofs(axes);
+    for (int i = 0; i < dofs; i++)
+        xyz[i] = uz_brick_corner[i / axes][i % axes] ? size[uz_brick_axis_of(axes, i % axes)] : 0.0;
     uz_element element = brick->element;
     element.xyz = xyz;
     bool good = uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD;
-    for (int i = 0; i < UZ_BRICK_DOFS * UZ_BRICK_DOFS; i++)
+    for (int i = 0; i < dofs * dofs; i++)
         good = good && fabs(ke[i]) < DBL_MAX / 1024;
-    for (int i = 0; i < UZ_BRICK_DOFS; i++)
-        good = good && ke[(UZ_BRICK_DOFS + 1) * i] > DBL_MIN * 1024;
+    for (int i = 0; i < dofs; i++)
+        good = good && ke[(dofs + 1) * i] > DBL_MIN * 1024;
     return good;
 }
 
-/* The sign of a corner in the part of this parity: odd along the axes whose bits it has. */
+/* The sign of a corner in the part of this parity: odd along the axes of the components whose bits it has. */
 static double sign_of(int corner, int parity)
 {
     const int *at = uz_brick_corner[corner], odd = (at[0] & parity) ^ (at[1] & parity >> 1) ^ (at[2] & parity >> 2);
     return odd ? -1.0 : 1.0;
 }
 
-double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, double unit)
+double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], int axes, const double *ke, double unit)
 {
+    const int dofs = uz_brick_dofs(axes), corners = uz_brick_corners(axes);
     double off = 0.0, most = 0.0;
-    for (int row = 0; row < 3 * UZ_BRICK_PARITIES; row++)
-        for (int column = 0; column < 3 * UZ_BRICK_PARITIES; column++) {
-            const int m = row % 3, l = column % 3, p = row / 3, q = column / 3;
+    memset(block, 0, 9 * UZ_BRICK_PARITIES * sizeof *block);
+    for (int row = 0; row < dofs; row++)
+        for (int column = 0; column < dofs; column++) {
+            const int m = row % axes, l = column % axes, p = row / axes, q = column / axes;
             double sum = 0.0;
-            for (int a = 0; a < UZ_BRICK_NODES; a++)
-                for (int b = 0; b < UZ_BRICK_NODES; b++)
-                    sum += sign_of(a, p) * sign_of(b, q) * (ke[(3 * a + m) * UZ_BRICK_DOFS + 3 * b + l] / unit);
-            sum /= UZ_BRICK_NODES * UZ_BRICK_NODES;
+            for (int a = 0; a < corners; a++)
+                for (int b = 0; b < corners; b++)
+                    sum += sign_of(a, p) * sign_of(b, q) * (ke[(axes * a + m) * dofs + axes * b + l] / unit);
+            sum /= corners * corners;
             most = fmax(most, fabs(sum));
             if ((p ^ (1 << m)) != (q ^ (1 << l)) || p == 0 || q == 0)
                 off = fmax(off, fabs(sum));
@@ -69,7 +71,8 @@ double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, do
 bool uz_brick_init(uz_brick *brick)
 {
     double block[9 * UZ_BRICK_PARITIES];
-    return uz_brick_stiffness(brick->ke, brick, brick->cell) && uz_brick_blocks(block, brick->ke, 1.0) <= REFLECTED;
+    return uz_brick_stiffness(brick->ke, brick, brick->cell) &&
+           uz_brick_blocks(block, brick->axes, brick->ke, 1.0) <= REFLECTED;
 }
 
 /* -------------------------------------------------------------- the diagonal */
@@ -92,29 +95,31 @@ static int place_of(int64_t at, int64_t cells)
 
 static void sum_diagonals(diagonal *x)
 {
+    const int axes = x->brick->axes, dofs = uz_brick_dofs(axes);
     for (int k = 0; k < PLACES; k++)
         for (int j = 0; j < PLACES; j++)
             for (int i = 0; i < PLACES; i++)
-                for (int a = 0; a < UZ_BRICK_NODES; a++) { /* the cell whose corner a is this node */
+                for (int a = 0; a < uz_brick_corners(axes); a++) { /* the cell whose corner a is this node */
                     const int *corner = uz_brick_corner[a], at[3] = {i, j, k};
                     bool there = true;
-                    for (int c = 0; c < 3; c++)
-                        there = there && at[c] != (corner[c] ? FIRST : LAST);
-                    for (int c = 0; there && c < 3; c++)
-                        x->sum[k][j][i][c] += x->brick->ke[(UZ_BRICK_DOFS + 1) * (3 * a + c)];
+                    for (int c = 0; c < axes; c++)
+                        there = there && at[uz_brick_axis_of(axes, c)] != (corner[c] ? FIRST : LAST);
+                    for (int c = 0; there && c < axes; c++)
+                        x->sum[k][j][i][c] += x->brick->ke[(dofs + 1) * (axes * a + c)];
                 }
 }
 
 static void fill_diagonals(void *ctx, int part)
 {
     const diagonal *x = ctx;
+    const int axes = x->brick->axes;
     const int64_t *n = x->brick->cells, planes = n[2] + 1, first = planes * part / x->parts,
                   end = planes * (part + 1) / x->parts;
-    const int64_t *dof = x->brick->dof + 3 * first * (n[0] + 1) * (n[1] + 1);
+    const int64_t *dof = x->brick->dof + axes * first * (n[0] + 1) * (n[1] + 1);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++)
-            for (int64_t i = 0; i <= n[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++)
+            for (int64_t i = 0; i <= n[0]; i++, dof += axes)
+                for (int c = 0; c < axes; c++)
                     if (dof[c] >= 0)
                         x->to->val[dof[c]] = x->sum[place_of(k, n[2])][place_of(j, n[1])][place_of(i, n[0])][c];
 }
@@ -156,7 +161,7 @@ bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick)
     room->stride = uz_brick_stride(brick->cells[0]);
     room->plane = room->stride * (brick->cells[1] + 1);
     room->most = uz_aside_count();
-    const int64_t n = 3 * room->plane + 2 * UZ_BRICK_PAD;
+    const int64_t n = brick->axes * room->plane + 2 * UZ_BRICK_PAD;
     bool ok = (room->of_plane = uz_alloc_zero(brick->cells[2] + 1, sizeof(double)));
     for (int part = 0; part < room->most; part++) {
         struct uz_brick_product_room *of = &room->of[part];
@@ -165,7 +170,7 @@ bool uz_brick_product_init(uz_brick_product *room, const uz_brick *brick)
             of->out[k] = uz_alloc_zero(n, sizeof(double));
             ok = ok && of->in[k] && of->out[k];
         }
-        of->sums = uz_alloc_zero(FIELDS * line_room(room->stride), sizeof(double));
+        of->sums = uz_alloc_zero(fields_of(brick->axes) * line_room(room->stride), sizeof(double));
         ok = ok && of->sums;
     }
     return ok;
@@ -199,9 +204,10 @@ typedef struct {
 /* Nodes `begin` to end - 1 of a line, by component, of the dofs. */
 static void unpack_nodes(double *to, const product *p, const int64_t *dof, int64_t begin, int64_t end)
 {
+    const int axes = p->brick->axes;
     for (int64_t i = begin; i < end; i++)
-        for (int c = 0; c < 3; c++) {
-            const int64_t own = dof[3 * i + c];
+        for (int c = 0; c < axes; c++) {
+            const int64_t own = dof[axes * i + c];
             to[c * p->room->plane + i] = own >= 0 ? (p->x ? p->x[own] : 0.0) : p->value ? p->value[-1 - own] : 0.0;
         }
 }
@@ -209,22 +215,27 @@ static void unpack_nodes(double *to, const product *p, const int64_t *dof, int64
 /* A plane of nodes by component, of the dofs. */
 static void unpack(double *plane, const product *p, int64_t k)
 {
+    const int axes = p->brick->axes;
     const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1, apart = p->room->plane;
     for (int64_t j = 0; j < lines; j++) {
-        const int64_t first = 3 * line * (lines * k + j), *dof = p->brick->dof + first;
+        const int64_t first = axes * line * (lines * k + j), *dof = p->brick->dof + first;
         double *to = plane + j * p->room->stride;
         int64_t begin = 0, end = p->nodal ? line : 0;
         if (p->x)
-            uz_brick_run(&begin, &end, dof, line);
+            uz_brick_run(&begin, &end, dof, line, axes);
         if (!p->nodal) {
             unpack_nodes(to, p, dof, 0, begin);
             unpack_nodes(to, p, dof, end, line);
         }
         if (begin == end)
             continue;
-        const double *restrict from = p->nodal ? p->nodal + first : p->x + dof[3 * begin];
-        double *restrict x = to + begin, *restrict y = x + apart, *restrict z = y + apart;
-        for (int64_t i = 0; i < end - begin; i++) {
+        const double *restrict from = p->nodal ? p->nodal + first : p->x + dof[axes * begin];
+        double *restrict x = to + begin, *restrict y = x + apart, *restrict z = y + (axes == 3 ? apart : 0);
+        for (int64_t i = 0; axes == 2 && i < end - begin; i++) {
+            x[i] = from[2 * i];
+            y[i] = from[2 * i + 1];
+        }
+        for (int64_t i = 0; axes == 3 && i < end - begin; i++) {
             x[i] = from[3 * i];
             y[i] = from[3 * i + 1];
             z[i] = from[3 * i + 2];
@@ -234,28 +245,34 @@ static void unpack(double *plane, const product *p, int64_t k)
 
 static void pack_nodes(const product *p, const int64_t *dof, const double *from, int64_t begin, int64_t end)
 {
+    const int axes = p->brick->axes;
     for (int64_t i = begin; i < end; i++)
-        for (int c = 0; c < 3; c++)
-            if (dof[3 * i + c] >= 0)
-                p->y[dof[3 * i + c]] = from[c * p->room->plane + i];
+        for (int c = 0; c < axes; c++)
+            if (dof[axes * i + c] >= 0)
+                p->y[dof[axes * i + c]] = from[c * p->room->plane + i];
 }
 
 /* The free dofs of a plane. */
 static void pack(const product *p, int64_t k, const double *plane)
 {
+    const int axes = p->brick->axes;
     const int64_t line = p->brick->cells[0] + 1, lines = p->brick->cells[1] + 1, apart = p->room->plane;
-    const int64_t *dof = p->brick->dof + 3 * line * lines * k;
-    for (int64_t j = 0; j < lines; j++, dof += 3 * line) {
+    const int64_t *dof = p->brick->dof + axes * line * lines * k;
+    for (int64_t j = 0; j < lines; j++, dof += axes * line) {
         const double *from = plane + j * p->room->stride;
         int64_t begin, end;
-        uz_brick_run(&begin, &end, dof, line);
+        uz_brick_run(&begin, &end, dof, line, axes);
         pack_nodes(p, dof, from, 0, begin);
         pack_nodes(p, dof, from, end, line);
         if (begin == end)
             continue;
-        const double *restrict x = from + begin, *restrict y = x + apart, *restrict z = y + apart;
-        double *restrict to = p->y + dof[3 * begin];
-        for (int64_t i = 0; i < end - begin; i++) {
+        const double *restrict x = from + begin, *restrict y = x + apart, *restrict z = y + (axes == 3 ? apart : 0);
+        double *restrict to = p->y + dof[axes * begin];
+        for (int64_t i = 0; axes == 2 && i < end - begin; i++) {
+            to[2 * i] = x[i];
+            to[2 * i + 1] = y[i];
+        }
+        for (int64_t i = 0; axes == 3 && i < end - begin; i++) {
             to[3 * i] = x[i];
             to[3 * i + 1] = y[i];
             to[3 * i + 2] = z[i];
@@ -265,32 +282,45 @@ static void pack(const product *p, int64_t k, const double *plane)
 
 /* The rows of cells between two planes of nodes. */
 static inline __attribute__((always_inline)) void layer(const uz_brick_product *room, struct uz_brick_product_room *of,
-                                                        const uz_brick *brick, const double *block)
+                                                        const uz_brick *brick, const double *block, const int axes)
 {
-    for (int64_t j = 0; j < brick->cells[1]; j++) {
+    const int lines = lines_of(axes), near = lines / 2; /* lines of the plane below */
+    for (int64_t j = 0; j < rows_of(brick->cells, axes); j++) {
         const double *in[COMPONENTS * LINES];
         double *out[COMPONENTS * LINES];
-        for (int m = 0; m < COMPONENTS; m++)
-            for (int q = 0; q < LINES; q++) {
-                const int64_t at = m * room->plane + (j + q % 2) * room->stride;
-                in[m * LINES + q] = of->in[q / 2] + at;
-                out[m * LINES + q] = of->out[q / 2] + at;
+        for (int m = 0; m < axes; m++)
+            for (int q = 0; q < lines; q++) {
+                const int64_t at = m * room->plane + (j + q % near) * room->stride;
+                in[m * lines + q] = of->in[q / near] + at;
+                out[m * lines + q] = of->out[q / near] + at;
             }
-        cells_of_line(of->sums, in, brick->cells[0], room->stride, block);
-        nodes_of_line(out, of->sums, room->stride, j == 0);
+        cells_of_line(of->sums, in, brick->cells[0], room->stride, block, axes);
+        nodes_of_line(out, of->sums, room->stride, j == 0, axes);
     }
 }
 
-UZ_AVX2_FMA static void layer_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
+UZ_AVX2_FMA static void solid_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
                                    const uz_brick *brick, const double *block)
 {
-    layer(room, of, brick, block);
+    layer(room, of, brick, block, 3);
 }
 
-static void layer_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
+static void solid_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
                          const double *block)
 {
-    layer(room, of, brick, block);
+    layer(room, of, brick, block, 3);
+}
+
+UZ_AVX2_FMA static void plane_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
+                                   const uz_brick *brick, const double *block)
+{
+    layer(room, of, brick, block, 2);
+}
+
+static void plane_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
+                         const double *block)
+{
+    layer(room, of, brick, block, 2);
 }
 
 /* What a plane adds to x'y, where dofs that are supported and do not move count for nothing. */
@@ -320,7 +350,8 @@ static void multiply_slab(void *ctx, int slab)
     const int64_t cells = p->brick->cells[2], first = uz_brick_slab(cells + 1, slab, p->slabs),
                   end = uz_brick_slab(cells + 1, slab + 1, p->slabs);
     struct uz_brick_product_room *of = &p->room->of[slab];
-    memset(of->out[0], 0, (size_t)(3 * p->room->plane) * sizeof(double));
+    const int64_t numbers = p->brick->axes * p->room->plane;
+    memset(of->out[0], 0, (size_t)numbers * sizeof(double));
     for (int64_t k = first > 0 ? first - 1 : 0; k < end; k++) {
         if (k == 0 || k + 1 == first)
             unpack(of->in[0], p, k);
@@ -331,7 +362,7 @@ static void multiply_slab(void *ctx, int slab)
         if (k >= first && p->y)
             pack(p, k, of->out[0]);
         if (k >= first && p->sums)
-            p->room->of_plane[k] = along_plane(of, 3 * p->room->plane);
+            p->room->of_plane[k] = along_plane(of, numbers);
         go_up(of);
     }
 }
@@ -340,7 +371,10 @@ static void share(product *p)
 {
     const int64_t planes = p->brick->cells[2] + 1;
     p->slabs = uz_brick_slabs(planes, planes * p->room->plane, p->room->most);
-    p->layer = uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow;
+    if (p->brick->axes == 2)
+        p->layer = uz_cpu_has_avx2_fma() ? plane_wide : plane_narrow;
+    else
+        p->layer = uz_cpu_has_avx2_fma() ? solid_wide : solid_narrow;
     uz_aside_share(multiply_slab, p, p->slabs);
 }
 
@@ -371,7 +405,7 @@ uz_status uz_brick_energy(double *twice, const uz_brick *brick, const double *no
     uz_brick_product room = {.stride = 0};
     double block[9 * UZ_BRICK_PARITIES];
     const bool ok = uz_brick_product_init(&room, brick);
-    (void)uz_brick_blocks(block, brick->ke, 1.0);
+    (void)uz_brick_blocks(block, brick->axes, brick->ke, 1.0);
     *twice = ok ? share_sum(&(product){.brick = brick, .block = block, .nodal = nodal, .room = &room}) : 0.0;
     uz_brick_product_clear(&room);
     return ok ? UZ_OK
@@ -384,7 +418,7 @@ uz_status uz_brick_subtract_moved(double *p, const uz_brick *brick, const double
     double block[9 * UZ_BRICK_PARITIES], *y = uz_alloc(brick->d, sizeof *y);
     const bool ok = uz_brick_product_init(&room, brick) && y;
     if (ok) {
-        (void)uz_brick_blocks(block, brick->ke, 1.0);
+        (void)uz_brick_blocks(block, brick->axes, brick->ke, 1.0);
         uz_brick_multiply(y, brick, block, &room, NULL, value);
         for (int64_t j = 0; j < brick->d; j++)
             p[j] -= y[j];

@@ -29,6 +29,8 @@ struct uz_multigrid_room {
 /* A factor of the last grid's K, its held dofs, where inverse is 0, being rows of the unit matrix. */
 uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const float *inverse, const uz_stop *stop,
                                    uz_error *err);
+/* Where the node of the next finer grid stands in its vectors that is nearest to node (i, j, k) of a grid. */
+int64_t uz_brick_nearest(const uz_brick_level *level, const uz_brick_level *finer, int64_t i, int64_t j, int64_t k);
 /* inverse of a grid from that of the next finer one. */
 void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer,
                            const float *above);

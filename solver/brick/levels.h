@@ -27,26 +27,27 @@ typedef struct {
 } uz_brick_smoother;
 /* Of a grid of so many cells, each with ke / unit, whatever dofs are held; coarser: along which axes the next one is.
  */
-void uz_brick_smoother_init(uz_brick_smoother *out, const int64_t cells[3], const double *ke, double unit,
+void uz_brick_smoother_init(uz_brick_smoother *out, int axes, const int64_t cells[3], const double *ke, double unit,
                             const bool coarser[3]);
 /* A bound on lambda_max(diag(K)^-1 M) of a cycle that smooths so on the first grid. */
 double uz_brick_bound_on_cycle(const uz_brick_smoother *s);
 
 typedef struct {
+    int axes;
     int64_t cells[3];
     double cell[3];
     int halvings[3];             /* along each axis, from the first grid */
     int64_t stride, plane, size; /* numbers in a line, a plane with a register more, and in all of one component */
     float block[9 * UZ_BRICK_PARITIES];
-    float diagonal[3]; /* what one cell gives to a node */
+    float diagonal[3]; /* what one cell gives to a node, by component */
     uz_brick_smoother smoother;
     uz_brick_axis to[3]; /* the next grid; not of the last one */
 } uz_brick_level;
 
-/* 3 size numbers and what kernels read beyond. */
+/* Of all components, and what kernels read beyond. */
 static inline int64_t uz_brick_numbers(const uz_brick_level *level)
 {
-    return 3 * level->size + 2 * UZ_BRICK_PAD;
+    return level->axes * level->size + 2 * UZ_BRICK_PAD;
 }
 
 /* false: no memory; clear it all the same. */

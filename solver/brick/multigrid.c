@@ -18,27 +18,29 @@ enum { FEW_DOFS = 200 };
 
 /* -------------------------------------------------------------- the grids */
 
-/* ke of two cells beside each other along an axis as one, between whose corners displacements are linear. */
-static void join_cells(double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], int axis)
+/* ke of two cells beside each other along the axis of a component as one, between whose corners displacements are
+ * linear. */
+static void join_cells(double ke[UZ_BRICK_DOFS * UZ_BRICK_DOFS], int axes, int axis)
 {
+    const int corners = uz_brick_corners(axes), n = uz_brick_dofs(axes);
     double joined[UZ_BRICK_DOFS * UZ_BRICK_DOFS] = {0.0};
     for (int half = 0; half < 2; half++) {
         double share[UZ_BRICK_NODES][UZ_BRICK_NODES]; /* of the whole's corners in those of the half */
-        for (int a = 0; a < UZ_BRICK_NODES; a++)
-            for (int of = 0; of < UZ_BRICK_NODES; of++) {
+        for (int a = 0; a < corners; a++)
+            for (int of = 0; of < corners; of++) {
                 const int *at = uz_brick_corner[a], *corner = uz_brick_corner[of];
                 const double along = 0.5 * (half + at[axis]);
                 share[a][of] = corner[axis] ? along : 1.0 - along;
-                for (int c = 0; c < 3; c++)
+                for (int c = 0; c < axes; c++)
                     if (c != axis && at[c] != corner[c])
                         share[a][of] = 0.0;
             }
-        for (int a = 0; a < UZ_BRICK_DOFS; a++)
-            for (int b = 0; b < UZ_BRICK_DOFS; b++)
-                for (int p = 0; p < UZ_BRICK_NODES; p++)
-                    for (int q = 0; q < UZ_BRICK_NODES; q++)
-                        joined[(3 * p + a % 3) * UZ_BRICK_DOFS + 3 * q + b % 3] +=
-                            share[a / 3][p] * share[b / 3][q] * ke[a * UZ_BRICK_DOFS + b];
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++)
+                for (int p = 0; p < corners; p++)
+                    for (int q = 0; q < corners; q++)
+                        joined[(axes * p + a % axes) * n + axes * q + b % axes] +=
+                            share[a / axes][p] * share[b / axes][q] * ke[a * n + b];
     }
     memcpy(ke, joined, sizeof joined);
 }
@@ -53,9 +55,9 @@ static bool stiffness_of(double *ke, const uz_brick *brick, const uz_brick_level
         size[c] = ldexp(level->cell[c], -level->halvings[c]);
     if (!uz_brick_stiffness(ke, brick, size))
         return false;
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < level->halvings[c]; k++)
-            join_cells(ke, c);
+    for (int c = 0; c < level->axes; c++)
+        for (int k = 0; k < level->halvings[uz_brick_axis_of(level->axes, c)]; k++)
+            join_cells(ke, level->axes, c);
     return true;
 }
 
@@ -70,12 +72,12 @@ static bool init_level(uz_brick_level *level, double *ke, const uz_brick *brick,
     level->size = level->plane * (level->cells[2] + 1);
     if (!stiffness_of(ke, brick, level))
         return false;
-    (void)uz_brick_blocks(block, ke, unit);
+    (void)uz_brick_blocks(block, level->axes, ke, unit);
     for (int i = 0; i < 9 * UZ_BRICK_PARITIES; i++)
         level->block[i] = (float)block[i];
-    for (int c = 0; c < 3; c++)
-        level->diagonal[c] = (float)(ke[(UZ_BRICK_DOFS + 1) * c] / unit);
-    uz_brick_smoother_init(&level->smoother, level->cells, ke, unit, coarser);
+    for (int c = 0; c < level->axes; c++)
+        level->diagonal[c] = (float)(ke[(uz_brick_dofs(level->axes) + 1) * c] / unit);
+    uz_brick_smoother_init(&level->smoother, level->axes, level->cells, ke, unit, coarser);
     return true;
 }
 
@@ -93,7 +95,7 @@ static bool coarsen(int64_t next[3], const uz_brick_level *level)
             least = fmin(least, level->cell[c]);
     for (int c = 0; c < 3; c++)
         next[c] = level->cells[c] > 1 && level->cell[c] < SHORT * least ? (level->cells[c] + 1) / 2 : level->cells[c];
-    return 3 * node_count(level->cells) > FEW_DOFS && node_count(next) < node_count(level->cells);
+    return level->axes * node_count(level->cells) > FEW_DOFS && node_count(next) < node_count(level->cells);
 }
 
 static bool make_levels(uz_brick_grids *mg, bool *sound)
@@ -106,6 +108,7 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
     for (;; l++) {
         uz_brick_level *level = &mg->level[l];
         int64_t next[3];
+        level->axes = brick->axes;
         const bool last = !coarsen(next, level) || l + 1 == UZ_BRICK_LEVELS_MOST;
         const bool coarser[3] = {next[0] < level->cells[0], next[1] < level->cells[1], next[2] < level->cells[2]};
         *sound = *sound && init_level(level, mg->ke, brick, mg->unit, coarser);
@@ -115,7 +118,7 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
         for (int c = 0; c < 3; c++) {
             mg->level[l + 1].cells[c] = next[c];
             mg->level[l + 1].halvings[c] = level->halvings[c] + (next[c] < level->cells[c] ? 1 : 0);
-            mg->level[l + 1].cell[c] = level->cell[c] * ((double)level->cells[c] / (double)next[c]);
+            mg->level[l + 1].cell[c] = next[c] > 0 ? level->cell[c] * ((double)level->cells[c] / (double)next[c]) : 0.0;
             if (!uz_brick_axis_init(&level->to[c], level->cells[c], next[c]))
                 return false;
         }
@@ -123,19 +126,20 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
 }
 
 /* Of the first grid. What rounding of the blocks does, E, comes with the sums w of a cell's corners, of which
- * x'diag(ke)x is an eighth of the diagonal's, to at most the norm of 8 D^-1/2 E D^-1/2 times x'diag(K)x. What products
- * round on the way goes up and down from node to node, where M^-1 leaves little of it: as much as half of FLT_EPSILON
- * of x before and after is allowed for. */
+ * x'diag(ke)x is an eighth of the diagonal's, to at most the norm of 8 D^-1/2 E D^-1/2 times x'diag(K)x; in the plane
+ * with 4 corners likewise. What products round on the way goes up and down from node to node, where M^-1 leaves little
+ * of it: as much as half of FLT_EPSILON of x before and after is allowed for. */
 static double rounding_of(const uz_brick_grids *mg)
 {
     const uz_brick_level *level = &mg->level[0];
     double most = 0.0;
-    for (int p = 0; p < UZ_BRICK_PARITIES; p++) {
+    for (int p = 0; p < uz_brick_corners(level->axes); p++) {
         double square = 0.0;
-        for (int m = 0; m < 3; m++)
-            for (int l = 0; l < 3; l++) {
+        for (int m = 0; m < level->axes; m++)
+            for (int l = 0; l < level->axes; l++) {
                 const int at = 9 * p + 3 * m + l;
-                const double off = UZ_BRICK_NODES * (mg->block[at] / mg->unit - (double)level->block[at]);
+                const double off =
+                    uz_brick_corners(level->axes) * (mg->block[at] / mg->unit - (double)level->block[at]);
                 square += off * off / ((double)level->diagonal[m] * (double)level->diagonal[l]);
             }
         most = fmax(most, square);
@@ -157,20 +161,21 @@ static void hold_slab(void *ctx, int slab)
 {
     const holding *x = ctx;
     const uz_brick_level *level = &x->mg->level[0];
+    const int axes = level->axes;
     const int64_t *n = level->cells, first = uz_brick_slab(n[2] + 1, slab, x->slabs),
                   end = uz_brick_slab(n[2] + 1, slab + 1, x->slabs);
-    const int64_t *dof = x->mg->brick->dof + 3 * (n[0] + 1) * (n[1] + 1) * first;
+    const int64_t *dof = x->mg->brick->dof + axes * (n[0] + 1) * (n[1] + 1) * first;
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++) {
             const int cells = (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
             float *to = x->inverse + k * level->plane + j * level->stride;
             float outer[3], inner[3]; /* at the ends of a line, and between them */
-            for (int c = 0; c < 3; c++) {
+            for (int c = 0; c < axes; c++) {
                 outer[c] = 1.0F / ((float)cells * level->diagonal[c]);
                 inner[c] = 1.0F / ((float)(2 * cells) * level->diagonal[c]);
             }
-            for (int64_t i = 0; i <= n[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++)
+            for (int64_t i = 0; i <= n[0]; i++, dof += axes)
+                for (int c = 0; c < axes; c++)
                     to[c * level->size + i] = dof[c] < 0 || (x->held && x->held[dof[c]]) ? 0.0F
                                               : i > 0 && i < n[0]                        ? inner[c]
                                                                                          : outer[c];
@@ -185,18 +190,23 @@ static void first_inverse(float *inverse, const uz_brick_grids *mg, const bool *
     uz_aside_share(hold_slab, &x, x.slabs);
 }
 
+int64_t uz_brick_nearest(const uz_brick_level *level, const uz_brick_level *finer, int64_t i, int64_t j, int64_t k)
+{
+    const int64_t *n = level->cells, *f = finer->cells, y = n[1] > 0 ? (j * f[1] + n[1] / 2) / n[1] : 0;
+    return (k * f[2] + n[2] / 2) / n[2] * finer->plane + y * finer->stride + (i * f[0] + n[0] / 2) / n[0];
+}
+
 /* A node of a coarser grid is held where the node of the finer one that stands there, or nearest to it, is. */
 void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer, const float *above)
 {
-    const int64_t *n = level->cells, *f = finer->cells;
+    const int64_t *n = level->cells;
     for (int64_t k = 0; k <= n[2]; k++)
         for (int64_t j = 0; j <= n[1]; j++)
             for (int64_t i = 0; i <= n[0]; i++) {
                 const int cells =
                     (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
-                const int64_t there = (k * f[2] + n[2] / 2) / n[2] * finer->plane +
-                                      (j * f[1] + n[1] / 2) / n[1] * finer->stride + (i * f[0] + n[0] / 2) / n[0];
-                for (int c = 0; c < 3; c++)
+                const int64_t there = uz_brick_nearest(level, finer, i, j, k);
+                for (int c = 0; c < level->axes; c++)
                     inverse[c * level->size + k * level->plane + j * level->stride + i] =
                         above[c * finer->size + there] != 0.0F ? 1.0F / ((float)cells * level->diagonal[c]) : 0.0F;
             }
@@ -206,7 +216,7 @@ void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz
 static int64_t list_coarsest(int64_t *place, const uz_brick_level *level)
 {
     int64_t n = 0;
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < level->axes; c++)
         for (int64_t k = 0; k <= level->cells[2]; k++)
             for (int64_t j = 0; j <= level->cells[1]; j++)
                 for (int64_t i = 0; i <= level->cells[0]; i++, n++)
@@ -215,12 +225,20 @@ static int64_t list_coarsest(int64_t *place, const uz_brick_level *level)
     return n;
 }
 
+/* From the first corner of a cell to another one, in a grid of so many nodes along x and y. */
+static int64_t step_to(int corner, int axes, int64_t nx, int64_t ny)
+{
+    const int *at = uz_brick_corner[corner];
+    return at[0] + (axes == 2 ? at[1] * nx * ny : at[1] * nx + at[2] * nx * ny);
+}
+
 /* The factor of the last grid's K, held dofs being rows of the unit matrix. */
 uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const float *inverse, const uz_stop *stop,
                                    uz_error *err)
 {
     const uz_brick_level *level = &mg->level[mg->base.levels - 1];
-    const int64_t n = mg->n_coarsest, nx = level->cells[0] + 1, ny = level->cells[1] + 1, nodes = n / 3;
+    const int axes = level->axes, dofs = uz_brick_dofs(axes);
+    const int64_t n = mg->n_coarsest, nx = level->cells[0] + 1, ny = level->cells[1] + 1, nodes = n / axes;
     int64_t *place = uz_alloc(n, sizeof *place);
     double *A = uz_alloc_zero(n * n, sizeof *A);
     uz_status status = UZ_OK;
@@ -231,15 +249,15 @@ uz_status uz_brick_factor_coarsest(double **out, const uz_brick_grids *mg, const
     }
     list_coarsest(place, level);
     for (int64_t k = 0; k < level->cells[2]; k++)
-        for (int64_t j = 0; j < level->cells[1]; j++)
+        for (int64_t j = 0; j < (axes == 2 ? 1 : level->cells[1]); j++)
             for (int64_t i = 0; i < level->cells[0]; i++)
-                for (int row = 0; row < UZ_BRICK_DOFS; row++)
-                    for (int column = 0; column < UZ_BRICK_DOFS; column++) {
-                        const int *a = uz_brick_corner[row / 3], *b = uz_brick_corner[column / 3];
-                        const int64_t at = row % 3 * nodes + ((k + a[2]) * ny + j + a[1]) * nx + i + a[0],
-                                      from = column % 3 * nodes + ((k + b[2]) * ny + j + b[1]) * nx + i + b[0];
+                for (int row = 0; row < dofs; row++)
+                    for (int column = 0; column < dofs; column++) {
+                        const int64_t first = (k * ny + j) * nx + i,
+                                      at = row % axes * nodes + first + step_to(row / axes, axes, nx, ny),
+                                      from = column % axes * nodes + first + step_to(column / axes, axes, nx, ny);
                         if (inverse[place[at]] != 0.0F && inverse[place[from]] != 0.0F)
-                            A[from * n + at] += mg->ke[row * UZ_BRICK_DOFS + column] / mg->unit;
+                            A[from * n + at] += mg->ke[row * dofs + column] / mg->unit;
                     }
     for (int64_t i = 0; i < n; i++)
         if (inverse[place[i]] == 0.0F)
@@ -269,14 +287,14 @@ static void solve_coarsest(const uz_brick_grids *mg, const uz_multigrid_room *ro
     const double *L = room->held_coarsest ? room->held_coarsest : mg->coarsest;
     double *x = room->coarse;
     int64_t n = 0;
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < level->axes; c++)
         for (int64_t k = 0; k <= level->cells[2]; k++)
             for (int64_t j = 0; j <= level->cells[1]; j++)
                 for (int64_t i = 0; i <= level->cells[0]; i++)
                     x[n++] = (double)v->b[c * level->size + k * level->plane + j * level->stride + i];
     uz_potrs_lower(n, L, n, x);
     n = 0;
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < level->axes; c++)
         for (int64_t k = 0; k <= level->cells[2]; k++)
             for (int64_t j = 0; j <= level->cells[1]; j++)
                 for (int64_t i = 0; i <= level->cells[0]; i++) {
@@ -317,37 +335,44 @@ static void pass_lines(const passage *p, int slab,
     const uz_brick_level *level = &p->mg->level[0];
     const int64_t nodes = level->cells[0] + 1, lines = level->cells[1] + 1, planes = level->cells[2] + 1;
     const int64_t first = uz_brick_slab(planes, slab, p->slabs), end = uz_brick_slab(planes, slab + 1, p->slabs);
-    const int64_t *dof = p->mg->brick->dof + 3 * nodes * lines * first;
+    const int64_t numbers = level->axes * nodes, *dof = p->mg->brick->dof + numbers * lines * first;
     for (int64_t k = first; k < end; k++)
-        for (int64_t j = 0; j < lines; j++, dof += 3 * nodes)
+        for (int64_t j = 0; j < lines; j++, dof += numbers)
             pass(p, dof, k * level->plane + j * level->stride, nodes);
 }
 
 /* Nodes `begin` to end - 1 of a line, whose first number stands at `at`. */
 static void read_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t begin, int64_t end)
 {
+    const int axes = p->mg->level[0].axes;
     const int64_t size = p->mg->level[0].size;
     for (int64_t i = begin; i < end; i++)
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < axes; c++) {
             const int64_t own = c * size + at + i;
-            p->v->b[own] = p->v->inverse[own] != 0.0F ? (float)(p->factor * p->r[dof[3 * i + c]]) : 0.0F;
+            p->v->b[own] = p->v->inverse[own] != 0.0F ? (float)(p->factor * p->r[dof[axes * i + c]]) : 0.0F;
         }
 }
 
 static void read_line(const passage *p, const int64_t *dof, int64_t at, int64_t nodes)
 {
     const double factor = p->factor;
+    const int axes = p->mg->level[0].axes;
     const int64_t size = p->mg->level[0].size;
     int64_t begin, end;
-    uz_brick_run(&begin, &end, dof, nodes);
+    uz_brick_run(&begin, &end, dof, nodes, axes);
     read_nodes(p, dof, at, 0, begin);
     read_nodes(p, dof, at, end, nodes);
     if (begin == end)
         return;
-    const double *restrict r = p->r + dof[3 * begin];
-    const float *x_free = p->v->inverse + at + begin, *y_free = x_free + size, *z_free = y_free + size;
-    float *restrict x = p->v->b + at + begin, *restrict y = x + size, *restrict z = y + size;
-    for (int64_t i = 0; i < end - begin; i++) {
+    const double *restrict r = p->r + dof[axes * begin];
+    const float *x_free = p->v->inverse + at + begin, *y_free = x_free + size,
+                *z_free = y_free + (axes == 3 ? size : 0);
+    float *restrict x = p->v->b + at + begin, *restrict y = x + size, *restrict z = y + (axes == 3 ? size : 0);
+    for (int64_t i = 0; axes == 2 && i < end - begin; i++) {
+        x[i] = x_free[i] != 0.0F ? (float)(factor * r[2 * i]) : 0.0F;
+        y[i] = y_free[i] != 0.0F ? (float)(factor * r[2 * i + 1]) : 0.0F;
+    }
+    for (int64_t i = 0; axes == 3 && i < end - begin; i++) {
         x[i] = x_free[i] != 0.0F ? (float)(factor * r[3 * i]) : 0.0F;
         y[i] = y_free[i] != 0.0F ? (float)(factor * r[3 * i + 1]) : 0.0F;
         z[i] = z_free[i] != 0.0F ? (float)(factor * r[3 * i + 2]) : 0.0F;
@@ -361,25 +386,31 @@ static void read_slab(void *ctx, int slab)
 
 static void write_nodes(const passage *p, const int64_t *dof, int64_t at, int64_t begin, int64_t end)
 {
+    const int axes = p->mg->level[0].axes;
     for (int64_t i = begin; i < end; i++)
-        for (int c = 0; c < 3; c++)
-            if (dof[3 * i + c] >= 0)
-                p->z[dof[3 * i + c]] = p->factor * (double)p->v->x[c * p->mg->level[0].size + at + i];
+        for (int c = 0; c < axes; c++)
+            if (dof[axes * i + c] >= 0)
+                p->z[dof[axes * i + c]] = p->factor * (double)p->v->x[c * p->mg->level[0].size + at + i];
 }
 
 static void write_line(const passage *p, const int64_t *dof, int64_t at, int64_t nodes)
 {
     const double factor = p->factor;
+    const int axes = p->mg->level[0].axes;
     const int64_t size = p->mg->level[0].size;
     int64_t begin, end;
-    uz_brick_run(&begin, &end, dof, nodes);
+    uz_brick_run(&begin, &end, dof, nodes, axes);
     write_nodes(p, dof, at, 0, begin);
     write_nodes(p, dof, at, end, nodes);
     if (begin == end)
         return;
-    const float *restrict x = p->v->x + at + begin, *restrict y = x + size, *restrict z = y + size;
-    double *restrict to = p->z + dof[3 * begin];
-    for (int64_t i = 0; i < end - begin; i++) {
+    const float *restrict x = p->v->x + at + begin, *restrict y = x + size, *restrict z = y + (axes == 3 ? size : 0);
+    double *restrict to = p->z + dof[axes * begin];
+    for (int64_t i = 0; axes == 2 && i < end - begin; i++) {
+        to[2 * i] = factor * (double)x[i];
+        to[2 * i + 1] = factor * (double)y[i];
+    }
+    for (int64_t i = 0; axes == 3 && i < end - begin; i++) {
         to[3 * i] = factor * (double)x[i];
         to[3 * i + 1] = factor * (double)y[i];
         to[3 * i + 2] = factor * (double)z[i];
@@ -460,7 +491,8 @@ static uz_multigrid_room *make_room(const uz_multigrid *base, size_t *bytes)
         return NULL;
     *bytes = sizeof *room;
     bool ok = uz_brick_product_init(&room->product, mg->brick);
-    *bytes += 96 * (size_t)(room->product.plane * room->product.most) + 8 * (size_t)(mg->brick->cells[2] + 1);
+    *bytes += 32 * (size_t)(mg->brick->axes * room->product.plane * room->product.most) +
+              8 * (size_t)(mg->brick->cells[2] + 1);
     room->levels = base->levels;
     for (int l = 0; l < base->levels; l++) {
         uz_brick_vectors *v = &room->v[l];
@@ -540,10 +572,10 @@ static const uz_multigrid_kind KIND = {.apply = apply,
 /* A room in single precision, four numbers a dof of all grids; the factor of the last; with dofs held both again. */
 double uz_brick_predict_bytes(const uz_brick *brick)
 {
-    const double stride = (double)uz_brick_stride(brick->cells[0]);
-    const double padded = 3.0 * stride * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
-    return 4.0 * 5.0 * 1.25 * padded + 16.0 * FEW_DOFS * FEW_DOFS +
-           192.0 * stride * (double)(brick->cells[1] + 1) * 3.0;
+    const double line = brick->axes * (double)uz_brick_stride(brick->cells[0]),
+                 padded = line * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
+    return 4.0 * 5.0 * (brick->axes == 2 ? 1.5 : 1.25) * padded + 16.0 * FEW_DOFS * FEW_DOFS +
+           192.0 * line * (double)(brick->cells[1] + 1);
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)
@@ -561,10 +593,10 @@ uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t m
     mg->base.knows_K = true;
     mg->brick = brick;
     double most = 0.0;
-    for (int i = 0; i < UZ_BRICK_DOFS; i++)
-        most = fmax(most, brick->ke[(UZ_BRICK_DOFS + 1) * i]);
+    for (int i = 0; i < uz_brick_dofs(brick->axes); i++)
+        most = fmax(most, brick->ke[(uz_brick_dofs(brick->axes) + 1) * i]);
     mg->unit = ldexp(1.0, ilogb(most));
-    (void)uz_brick_blocks(mg->block, brick->ke, 1.0);
+    (void)uz_brick_blocks(mg->block, brick->axes, brick->ke, 1.0);
     bool sound = true, ok = make_levels(mg, &sound);
     for (int l = 0; ok && sound && l < mg->base.levels; l++) {
         ok = (mg->inverse[l] = uz_alloc_zero(uz_brick_numbers(&mg->level[l]), sizeof(float)));

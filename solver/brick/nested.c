@@ -83,14 +83,13 @@ static void restrict_problem(nested *x, int l)
     const uz_brick_level *fine = &x->mg->level[l - 1], *level = &x->mg->level[l];
     const grid_problem *from = &x->grid[l - 1], *to = &x->grid[l];
     const uz_brick_vectors above = {.t = from->p}, below = {.b = to->p, .inverse = x->mg->inverse[l]};
-    const int64_t *n = level->cells, *f = fine->cells;
+    const int64_t *n = level->cells;
     uz_brick_restrict(fine, level, &above, &below, &x->room->planes);
     for (int64_t k = 0; k <= n[2]; k++)
         for (int64_t j = 0; j <= n[1]; j++)
             for (int64_t i = 0; i <= n[0]; i++) {
-                const int64_t there = (k * f[2] + n[2] / 2) / n[2] * fine->plane +
-                                      (j * f[1] + n[1] / 2) / n[1] * fine->stride + (i * f[0] + n[0] / 2) / n[0];
-                for (int c = 0; c < 3; c++) {
+                const int64_t there = uz_brick_nearest(level, fine, i, j, k);
+                for (int c = 0; c < level->axes; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
                     to->bottom[at] = from->bottom[c * fine->size + there];
                     to->top[at] = from->top[c * fine->size + there];
@@ -125,7 +124,7 @@ static uz_status hold(nested *x, int l, const uz_stop *stop, uz_error *err)
     const uz_brick_grids *mg = x->mg;
     uz_multigrid_room *room = x->room;
     const int last = mg->base.levels - 1;
-    const int64_t n = 3 * mg->level[l].size;
+    const int64_t n = mg->level[l].axes * mg->level[l].size;
     for (int64_t i = 0; i < n; i++)
         room->held[l][i] = x->grid[l].touches[i] != 0.0F ? 0.0F : mg->inverse[l][i];
     for (int k = l; k <= last; k++) {
@@ -148,7 +147,7 @@ static void residual(const nested *x, int l)
 /* z = M^-1 r in room->v[l].x; sqrt(r'z). */
 static double precondition(const nested *x, int l)
 {
-    const int64_t n = 3 * x->mg->level[l].size;
+    const int64_t n = x->mg->level[l].axes * x->mg->level[l].size;
     memcpy(x->room->v[l].b, x->r, (size_t)n * sizeof(float));
     uz_brick_cycle(x->mg, x->room, l);
     return dot(x->r, x->room->v[l].x, n);
@@ -157,7 +156,7 @@ static double precondition(const nested *x, int l)
 /* Conjugate gradients on the dofs that are not held; r: the residual there. */
 static void iterate(nested *x, int l)
 {
-    const int64_t n = 3 * x->mg->level[l].size;
+    const int64_t n = x->mg->level[l].axes * x->mg->level[l].size;
     const float *inverse = x->room->held[l], *z = x->room->v[l].x;
     const uz_brick_vectors v = {.x = x->direction, .b = x->zero, .t = x->q, .d = x->q, .inverse = inverse};
     for (int64_t i = 0; i < n; i++)
@@ -188,7 +187,7 @@ static int64_t exchange(const nested *x, int l)
 {
     const grid_problem *g = &x->grid[l];
     int64_t changed = 0;
-    for (int64_t i = 0; i < 3 * x->mg->level[l].size; i++) {
+    for (int64_t i = 0; i < x->mg->level[l].axes * x->mg->level[l].size; i++) {
         const float before = g->touches[i], pull = x->r[i] * before;
         if (before != 0.0F && pull < 0.0F) {
             g->touches[i] = 0.0F;
@@ -252,8 +251,8 @@ static int64_t first_plane(const finest *f, int part)
 static int64_t first_limit(const finest *f, int64_t plane)
 {
     const uz_brick *brick = f->x->mg->brick;
-    const int64_t *dof = brick->dof + 3 * plane * (brick->cells[0] + 1) * (brick->cells[1] + 1),
-                  *end = brick->dof + 3 * brick->n_nodes;
+    const int64_t *dof = brick->dof + brick->axes * plane * (brick->cells[0] + 1) * (brick->cells[1] + 1),
+                  *end = brick->dof + brick->axes * brick->n_nodes;
     while (dof < end && *dof < 0)
         dof++;
     int64_t low = 0, high = dof < end ? f->limits->n : 0;
@@ -274,12 +273,12 @@ static void read_part(void *ctx, int part)
     const uz_brick_level *level = &x->mg->level[0];
     const grid_problem *g = &x->grid[0];
     const int64_t first = first_plane(f, part), end = first_plane(f, part + 1);
-    const int64_t *dof = x->mg->brick->dof + 3 * first * (level->cells[0] + 1) * (level->cells[1] + 1);
+    const int64_t *dof = x->mg->brick->dof + level->axes * first * (level->cells[0] + 1) * (level->cells[1] + 1);
     int64_t next = first_limit(f, first);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
-            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++) {
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += level->axes)
+                for (int c = 0; c < level->axes; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i;
                     const int64_t b = limit_of(f->limits, &next, dof[c]);
                     g->p[at] = dof[c] >= 0 ? (float)(f->down * (f->p[dof[c]] / x->mg->unit)) : 0.0F;
@@ -306,12 +305,12 @@ static void write_part(void *ctx, int part)
     const uz_brick_level *level = &x->mg->level[0];
     const uz_brick_vectors *v = &x->room->v[0];
     const int64_t first = first_plane(f, part), end = first_plane(f, part + 1);
-    const int64_t *dof = x->mg->brick->dof + 3 * first * (level->cells[0] + 1) * (level->cells[1] + 1);
+    const int64_t *dof = x->mg->brick->dof + level->axes * first * (level->cells[0] + 1) * (level->cells[1] + 1);
     int64_t next = first_limit(f, first);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= level->cells[1]; j++)
-            for (int64_t i = 0; i <= level->cells[0]; i++, dof += 3)
-                for (int c = 0; c < 3; c++) {
+            for (int64_t i = 0; i <= level->cells[0]; i++, dof += level->axes)
+                for (int c = 0; c < level->axes; c++) {
                     const int64_t at = c * level->size + k * level->plane + j * level->stride + i, own = dof[c];
                     if (own < 0)
                         continue;
@@ -355,7 +354,7 @@ uz_status uz_brick_start(const uz_multigrid *base, uz_multigrid_room *room, bool
         const grid_problem *g = &x.grid[l];
         if (l < last)
             prolong_problem(&x, l, g->u, g->touches);
-        for (int64_t i = 0; i < 3 * x.mg->level[l].size; i++)
+        for (int64_t i = 0; i < x.mg->level[l].axes * x.mg->level[l].size; i++)
             g->touches[i] =
                 x.mg->inverse[l][i] != 0.0F ? decide(&g->u[i], g->touches[i], g->bottom[i], g->top[i]) : 0.0F;
         status = solve_grid(&x, l, stop, err);

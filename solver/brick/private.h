@@ -13,9 +13,10 @@ static inline int64_t uz_brick_stride(int64_t cells)
     return (cells + 1 + UZ_BRICK_PAD - 1) / UZ_BRICK_PAD * UZ_BRICK_PAD;
 }
 
-/* ke by parities, 9 numbers each, symmetric, divided by `unit`. The largest entry off the blocks, or that resists what
- * all corners do alike and counts as 0, relative to the largest of all. */
-double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], const double *ke, double unit);
+/* ke by parities, 9 numbers each, of which the plane needs those of its two components and its four parities only,
+ * symmetric, divided by `unit`. Bits of a parity are those of components. The largest entry off the blocks, or that
+ * resists what all corners do alike and counts as 0, relative to the largest of all. */
+double uz_brick_blocks(double block[9 * UZ_BRICK_PARITIES], int axes, const double *ke, double unit);
 /* ke of a cell of another size; false: it is out of range. */
 bool uz_brick_stiffness(double *ke, const uz_brick *brick, const double size[3]);
 

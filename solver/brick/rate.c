@@ -5,8 +5,8 @@
 
 #include <sys/mman.h>
 
-/* Cells along each side of a cube, the vectors of which are more than most cores have for themselves. */
-enum { CELLS = 24, NODES = CELLS + 1, REPEATS = 40, DEGREE = 2 };
+/* Cells along each side of a cube, or a square, the vectors of which are more than most cores have for themselves. */
+enum { CELLS = 24, PLANE_CELLS = 128, REPEATS = 40, DEGREE = 2 };
 
 #define ENOUGH_S 0.002
 /* What is assumed where there is no memory: a core of 2022. */
@@ -36,16 +36,19 @@ static double time_step(const uz_brick_level *level, uz_brick_planes *planes, fl
     planes->most = 1; /* seconds are those of this thread */
     const double least = uz_least_seconds(smooth, &x, 2, REPEATS, ENOUGH_S);
     planes->most = most;
-    return least / (DEGREE * 3.0 * NODES * NODES * NODES);
+    const double nodes = (double)((level->cells[0] + 1) * (level->cells[1] + 1) * (level->cells[2] + 1));
+    return least / (DEGREE * level->axes * nodes);
 }
 
-double uz_brick_rate(void)
+double uz_brick_rate(int axes)
 {
-    const int64_t stride = uz_brick_stride(CELLS), plane = stride * NODES + UZ_BRICK_PAD;
-    uz_brick_level level = {.cells = {CELLS, CELLS, CELLS},
+    const int64_t side = axes == 2 ? PLANE_CELLS : CELLS, across = axes == 2 ? 0 : side, stride = uz_brick_stride(side),
+                  plane = stride * (across + 1) + UZ_BRICK_PAD;
+    uz_brick_level level = {.axes = axes,
+                            .cells = {side, across, side},
                             .stride = stride,
                             .plane = plane,
-                            .size = plane * NODES,
+                            .size = plane * (side + 1),
                             .smoother = {.degree = DEGREE, .p = {0.0F, 0.1F}, .q = {0.1F, 0.1F}}};
     const size_t bytes = 4 * (size_t)uz_brick_numbers(&level) * sizeof(float);
     double rate = ASSUMED_S;

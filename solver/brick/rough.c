@@ -42,7 +42,7 @@ static void take_steps(rough *s, const uz_brick_grids *mg, const uz_multigrid_ro
 {
     const uz_brick_level *level = &mg->level[0];
     const uz_brick_vectors product = {.x = s->direction, .t = s->v->t, .inverse = s->v->inverse};
-    const int64_t n = 3 * level->size;
+    const int64_t n = level->axes * level->size;
     uz_brick_cycle(mg, room, 0);
     double square = uz_long_dot_single(n, s->v->b, s->v->x);
     memcpy(s->direction, s->v->x, (size_t)n * sizeof(float));

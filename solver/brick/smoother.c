@@ -11,18 +11,18 @@
 
 enum { DOFS = UZ_BRICK_DOFS, ROOT_POWERS = 7 };
 
-/* lambda_max of a symmetric matrix without negative eigenvalues, at most 1.3 % too large: the root of the norm of a
- * high power. */
-static double largest(const double given[DOFS * DOFS])
+/* lambda_max of a symmetric matrix (n x n) without negative eigenvalues, at most 1.3 % too large: the root of the norm
+ * of a high power. */
+static double largest(const double *given, int n)
 {
     double A[DOFS * DOFS], square[DOFS * DOFS], log_scale = 0.0;
-    memcpy(A, given, sizeof A);
+    memcpy(A, given, (size_t)(n * n) * sizeof *A);
     for (int power = 0;; power++) {
         double norm = 0.0;
-        for (int i = 0; i < DOFS; i++) {
+        for (int i = 0; i < n; i++) {
             double sum = 0.0;
-            for (int j = 0; j < DOFS; j++)
-                sum += fabs(A[DOFS * i + j]);
+            for (int j = 0; j < n; j++)
+                sum += fabs(A[n * i + j]);
             norm = fmax(norm, sum);
         }
         if (norm == 0.0)
@@ -30,88 +30,93 @@ static double largest(const double given[DOFS * DOFS])
         log_scale = 2.0 * log_scale + log(norm); /* A stands for exp(log_scale) A */
         if (power == ROOT_POWERS)
             return exp(log_scale / (double)(1 << ROOT_POWERS));
-        for (int i = 0; i < DOFS * DOFS; i++)
+        for (int i = 0; i < n * n; i++)
             A[i] /= norm;
         memset(square, 0, sizeof square);
-        for (int i = 0; i < DOFS; i++)
-            for (int k = 0; k < DOFS; k++)
-                for (int j = 0; j < DOFS; j++)
-                    square[DOFS * i + j] += A[DOFS * i + k] * A[DOFS * k + j];
-        memcpy(A, square, sizeof A);
+        for (int i = 0; i < n; i++)
+            for (int k = 0; k < n; k++)
+                for (int j = 0; j < n; j++)
+                    square[n * i + j] += A[n * i + k] * A[n * k + j];
+        memcpy(A, square, (size_t)(n * n) * sizeof *A);
     }
 }
 
-/* A part of cells is symmetric to its reflections, as each cell is: K is eight blocks, for displacements that are even
- * or odd along each axis, which those of an eighth of the nodes tell. Returns with which sign a dof follows from which
- * of these, 0: it is 0. */
-static int follow(int *from, const int node[3], int component, const int cells[3], int parity)
+/* A part of cells is symmetric to its reflections, as each cell is: K is eight blocks, in the plane four, for
+ * displacements that are even or odd along each axis, which those of an eighth of the nodes tell. Returns with which
+ * sign a dof follows from which of these, 0: it is 0. Here and below nodes and cells of a part are by component. */
+static int follow(int *from, int axes, const int node[3], int component, const int cells[3], int parity)
 {
     int sign = 1;
     *from = component;
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < axes; c++) {
         const bool odd = (parity >> c & 1) != (c == component), beyond = 2 * node[c] > cells[c];
         if (odd)
             sign *= beyond ? -1 : 2 * node[c] == cells[c] ? 0 : 1;
-        *from += 3 * (beyond ? cells[c] - node[c] : node[c]) << c;
+        *from += axes * (beyond ? cells[c] - node[c] : node[c]) << c;
     }
     return sign;
 }
 
 /* The largest eigenvalue of diag(K)^-1 K of a part of at most three cells along each axis. */
-static double most_of_part(const int cells[3], const double *ke, double unit)
+static double most_of_part(int axes, const int cells[3], const double *ke, double unit)
 {
+    const int n = uz_brick_dofs(axes);
     double most = 0.0;
-    for (int parity = 0; parity < UZ_BRICK_PARITIES; parity++) {
+    for (int parity = 0; parity < uz_brick_corners(axes); parity++) {
         double K[DOFS * DOFS] = {0.0}, D[DOFS] = {0.0};
         for (int cell = 0; cell < cells[0] * cells[1] * cells[2]; cell++) {
             const int at[3] = {cell % cells[0], cell / cells[0] % cells[1], cell / cells[0] / cells[1]};
             int from[DOFS], sign[DOFS];
-            for (int i = 0; i < DOFS; i++) {
-                const int *corner = uz_brick_corner[i / 3];
+            for (int i = 0; i < n; i++) {
+                const int *corner = uz_brick_corner[i / axes];
                 const int node[3] = {at[0] + corner[0], at[1] + corner[1], at[2] + corner[2]};
-                sign[i] = follow(&from[i], node, i % 3, cells, parity);
+                sign[i] = follow(&from[i], axes, node, i % axes, cells, parity);
             }
-            for (int i = 0; i < DOFS; i++) {
-                D[from[i]] += sign[i] * sign[i] * (ke[(DOFS + 1) * i] / unit);
-                for (int j = 0; j < DOFS; j++)
-                    K[DOFS * from[i] + from[j]] += sign[i] * sign[j] * (ke[DOFS * i + j] / unit);
+            for (int i = 0; i < n; i++) {
+                D[from[i]] += sign[i] * sign[i] * (ke[(n + 1) * i] / unit);
+                for (int j = 0; j < n; j++)
+                    K[n * from[i] + from[j]] += sign[i] * sign[j] * (ke[n * i + j] / unit);
             }
         }
-        for (int i = 0; i < DOFS; i++)
-            for (int j = 0; j < DOFS; j++)
-                K[DOFS * i + j] = D[i] > 0.0 && D[j] > 0.0 ? K[DOFS * i + j] / (sqrt(D[i]) * sqrt(D[j])) : 0.0;
-        most = fmax(most, largest(K));
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++)
+                K[n * i + j] = D[i] > 0.0 && D[j] > 0.0 ? K[n * i + j] / (sqrt(D[i]) * sqrt(D[j])) : 0.0;
+        most = fmax(most, largest(K, n));
     }
     return most;
 }
 
 /* Parts of two cells along each axis, and one of three where their number is odd. */
-static double most_of(const int64_t cells[3], const double *ke, double unit)
+static double most_of(int axes, const int64_t cells[3], const double *ke, double unit)
 {
     double most = 0.0;
     int part[3];
     for (part[0] = 1; part[0] <= 3; part[0]++)
         for (part[1] = 1; part[1] <= 3; part[1]++)
-            for (part[2] = 1; part[2] <= 3; part[2]++) {
+            for (part[2] = 1; part[2] <= (axes == 2 ? 1 : 3); part[2]++) {
                 bool there = true;
-                for (int c = 0; c < 3; c++)
-                    there =
-                        there && (cells[c] <= 3 ? part[c] == cells[c] : part[c] == 2 || part[c] == 2 + cells[c] % 2);
+                for (int c = 0; c < axes; c++) {
+                    const int64_t n = cells[uz_brick_axis_of(axes, c)];
+                    there = there && (n <= 3 ? part[c] == n : part[c] == 2 || part[c] == 2 + n % 2);
+                }
                 if (there)
-                    most = fmax(most, most_of_part(part, ke, unit));
+                    most = fmax(most, most_of_part(axes, part, ke, unit));
             }
     return most;
 }
 
 /* The least eigenvalue of diag(K)^-1 K among oscillations from node to node that the next grid has not. */
-static double least_of_oscillations(const double *ke, double unit, const bool coarser[3])
+static double least_of_oscillations(int axes, const double *ke, double unit, const bool coarser[3])
 {
-    const int lost = (coarser[0] ? 1 : 0) | (coarser[1] ? 2 : 0) | (coarser[2] ? 4 : 0);
+    const int corners = uz_brick_corners(axes), n = uz_brick_dofs(axes);
+    int lost = 0;
     double block[9 * UZ_BRICK_PARITIES], least = INFINITY;
-    (void)uz_brick_blocks(block, ke, unit);
-    for (int parity = 0; parity < UZ_BRICK_PARITIES; parity++)
-        for (int m = 0; m < 3 && (parity & lost) != 0; m++) /* displacements along an axis */
-            least = fmin(least, UZ_BRICK_NODES * block[9 * (parity ^ 1 << m) + 4 * m] / (ke[(DOFS + 1) * m] / unit));
+    for (int m = 0; m < axes; m++)
+        lost |= coarser[uz_brick_axis_of(axes, m)] ? 1 << m : 0;
+    (void)uz_brick_blocks(block, axes, ke, unit);
+    for (int parity = 0; parity < corners; parity++)
+        for (int m = 0; m < axes && (parity & lost) != 0; m++) /* displacements along an axis */
+            least = fmin(least, corners * block[9 * (parity ^ 1 << m) + 4 * m] / (ke[(n + 1) * m] / unit));
     return least;
 }
 
@@ -122,10 +127,10 @@ static double least_of_oscillations(const double *ke, double unit, const bool co
 enum { DEGREE_LEAST = 2 };
 
 /* Chebyshev's, so many steps as the next grid leaves to do. */
-void uz_brick_smoother_init(uz_brick_smoother *out, const int64_t cells[3], const double *ke, double unit,
+void uz_brick_smoother_init(uz_brick_smoother *out, int axes, const int64_t cells[3], const double *ke, double unit,
                             const bool coarser[3])
 {
-    const double most = most_of(cells, ke, unit), range = most / least_of_oscillations(ke, unit, coarser);
+    const double most = most_of(axes, cells, ke, unit), range = most / least_of_oscillations(axes, ke, unit, coarser);
     int degree = DEGREE_LEAST;
     while (degree < UZ_BRICK_DEGREE_MOST && COVERED * degree * degree < range)
         degree++;

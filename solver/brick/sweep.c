@@ -29,8 +29,8 @@ static int64_t stages_of(const uz_brick_level *level, int part)
 
 bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, size_t *bytes)
 {
-    const int64_t plane = 3 * level->plane + 2 * UZ_BRICK_PAD, sums = FIELDS * line_room(level->stride),
-                  line = 2 * (level->stride + UZ_BRICK_PAD);
+    const int64_t plane = level->axes * level->plane + 2 * UZ_BRICK_PAD,
+                  sums = fields_of(level->axes) * line_room(level->stride), line = 2 * (level->stride + UZ_BRICK_PAD);
     bool ok = (room->of_plane = uz_alloc_zero(level->cells[2] + 1, sizeof(double)));
     *bytes += 8 * (size_t)(level->cells[2] + 1);
     room->most = uz_aside_count();
@@ -39,7 +39,7 @@ bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, si
         /* reach: planes of x and of d, below and above, where there are two slabs */
         const int64_t stages = stages_of(level, part),
                       reach = room->most < 2 ? 0 : stages_of(level, part > 0 ? part : 1),
-                      beside = reach > 0 ? 4 * reach * 3 * level->plane + 2 * UZ_BRICK_PAD : 0;
+                      beside = reach > 0 ? 4 * reach * level->axes * level->plane + 2 * UZ_BRICK_PAD : 0;
         for (int k = 0; k < 2 * stages; k++)
             ok = (of->plane[k / 2][k % 2] = uz_alloc_zero(plane, sizeof(float))) && ok;
         ok = (of->sums = uz_alloc_zero(sums, sizeof(float))) && ok;
@@ -71,33 +71,46 @@ typedef struct {
 
 /* What the cells of a layer do to the nodes is added to near, and is all that far has. */
 static inline __attribute__((always_inline)) void layer(const uz_brick_level *level, float *sums, const nodes *x,
-                                                        float *near, float *far)
+                                                        float *near, float *far, const int axes)
 {
-    for (int64_t j = 0; j < level->cells[1]; j++) {
+    const int lines = lines_of(axes), below = lines / 2; /* those of near */
+    for (int64_t j = 0; j < rows_of(level->cells, axes); j++) {
         const float *in[COMPONENTS * LINES];
         float *out[COMPONENTS * LINES];
-        for (int m = 0; m < COMPONENTS; m++)
-            for (int q = 0; q < LINES; q++) {
-                const int64_t line = (j + q % 2) * level->stride;
-                in[m * LINES + q] = q < 2 ? x->near + m * x->apart_near + line : x->far + m * x->apart_far + line;
-                out[m * LINES + q] = (q < 2 ? near : far) + m * level->plane + line;
+        for (int m = 0; m < axes; m++)
+            for (int q = 0; q < lines; q++) {
+                const int64_t line = (j + q % below) * level->stride;
+                in[m * lines + q] = q < below ? x->near + m * x->apart_near + line : x->far + m * x->apart_far + line;
+                out[m * lines + q] = (q < below ? near : far) + m * level->plane + line;
             }
-        cells_of_line(sums, in, level->cells[0], level->stride, level->block);
-        nodes_of_line(out, sums, level->stride, j == 0);
+        cells_of_line(sums, in, level->cells[0], level->stride, level->block, axes);
+        nodes_of_line(out, sums, level->stride, j == 0, axes);
     }
 }
 
 /* Functions of their own: a slab has to compute what the one below it has to the last bit. */
-__attribute__((noinline)) UZ_AVX2_FMA static void layer_wide(const uz_brick_level *level, float *sums, const nodes *x,
+__attribute__((noinline)) UZ_AVX2_FMA static void solid_wide(const uz_brick_level *level, float *sums, const nodes *x,
                                                              float *near, float *far)
 {
-    layer(level, sums, x, near, far);
+    layer(level, sums, x, near, far, 3);
 }
 
-__attribute__((noinline)) static void layer_narrow(const uz_brick_level *level, float *sums, const nodes *x,
+__attribute__((noinline)) static void solid_narrow(const uz_brick_level *level, float *sums, const nodes *x,
                                                    float *near, float *far)
 {
-    layer(level, sums, x, near, far);
+    layer(level, sums, x, near, far, 3);
+}
+
+__attribute__((noinline)) UZ_AVX2_FMA static void plane_wide(const uz_brick_level *level, float *sums, const nodes *x,
+                                                             float *near, float *far)
+{
+    layer(level, sums, x, near, far, 2);
+}
+
+__attribute__((noinline)) static void plane_narrow(const uz_brick_level *level, float *sums, const nodes *x,
+                                                   float *near, float *far)
+{
+    layer(level, sums, x, near, far, 2);
 }
 
 /* What is done to a plane: x = d = q inverse b; of a polynomial, x += d, its first step, d = q inverse (b - K x), and
@@ -207,7 +220,7 @@ static float *plane_of(int64_t *apart, const slab *own, int vector, int64_t k)
         return (vector == 0 ? s->v->x : s->v->d) + k * plane;
     *apart = plane;
     const int64_t reach = s->stages, place = k < own->begin ? reach - (own->begin - k) : reach + k - own->end;
-    return own->room.beside + (2 * vector * reach + place) * 3 * plane;
+    return own->room.beside + (2 * vector * reach + place) * s->level->axes * plane;
 }
 
 /* x beside the slab as it is before others change it there. */
@@ -218,7 +231,7 @@ static void copy_beside(void *ctx, int part)
     for (int64_t k = lowest(&own, 0); k <= highest(&own, 0); k++) {
         int64_t apart;
         float *x = plane_of(&apart, &own, 0, k);
-        for (int m = 0; (k < own.begin || k >= own.end) && m < COMPONENTS; m++)
+        for (int m = 0; (k < own.begin || k >= own.end) && m < s->level->axes; m++)
             memcpy(x + m * apart, s->v->x + m * s->level->size + k * s->level->plane,
                    (size_t)s->level->plane * sizeof(float));
     }
@@ -230,7 +243,11 @@ static void add_layer(const slab *own, int64_t k, float *near, float *far)
     nodes x;
     x.near = plane_of(&x.apart_near, own, 0, k);
     x.far = plane_of(&x.apart_far, own, 0, k + 1);
-    (uz_cpu_has_avx2_fma() ? layer_wide : layer_narrow)(own->s->level, own->room.sums, &x, near, far);
+    const bool wide = uz_cpu_has_avx2_fma();
+    if (own->s->level->axes == 2)
+        (wide ? plane_wide : plane_narrow)(own->s->level, own->room.sums, &x, near, far);
+    else
+        (wide ? solid_wide : solid_narrow)(own->s->level, own->room.sums, &x, near, far);
 }
 
 static void finish_plane(const slab *own, int64_t k, const float *Kx, const stage *what)
@@ -240,7 +257,7 @@ static void finish_plane(const slab *own, int64_t k, const float *Kx, const stag
     int64_t apart;
     float *x = plane_of(&apart, own, 0, k), *d = s->changes ? plane_of(&apart, own, 1, k) : NULL;
     double sum = 0.0;
-    for (int m = 0; m < COMPONENTS; m++) {
+    for (int m = 0; m < s->level->axes; m++) {
         const int64_t at = m * s->level->size + k * plane;
         const uz_brick_vectors v = {.x = x + m * apart,
                                     .d = d ? d + m * apart : NULL,
@@ -273,7 +290,7 @@ static void go_on(slab *own, int number, int64_t k)
     if (k + 1 < low || k > highest(own, number) || k < 0)
         return;
     if (k == 0)
-        memset(sums[0], 0, (size_t)(3 * s->level->plane) * sizeof(float));
+        memset(sums[0], 0, (size_t)(s->level->axes * s->level->plane) * sizeof(float));
     if (k < s->level->cells[2])
         add_layer(own, k, sums[0], sums[1]);
     if (k >= low)

@@ -18,7 +18,8 @@ bool uz_brick_axis_init(uz_brick_axis *axis, int64_t fine, int64_t coarse)
     axis->share = uz_alloc_zero((coarse + 1) * UZ_BRICK_SHARES, sizeof *axis->share);
     if (!axis->below || !axis->beyond || !axis->first || !axis->share)
         return false;
-    for (int64_t i = 0; i <= fine; i++) { /* stands at i coarse / fine, in coarse cells */
+    /* stands at i coarse / fine, in coarse cells; of an axis that is not there its one node is the coarse one */
+    for (int64_t i = 0; fine > 0 && i <= fine; i++) {
         const int64_t below = i == fine ? coarse - 1 : i * coarse / fine, rest = i * coarse - below * fine;
         axis->below[i] = (int32_t)below;
         axis->beyond[i] = (float)rest / (float)fine;
@@ -85,7 +86,7 @@ static inline __attribute__((always_inline)) void restrict_all(const transfer *t
     const uz_brick_level *f = t->f, *c = t->c;
     const uz_brick_vectors *v = t->v, *coarse = t->coarse;
     const uz_brick_axis *to = f->to;
-    for (int m = 0; m < 3; m++)
+    for (int m = 0; m < f->axes; m++)
         for (int64_t K = first; K < end; K++)
             for (int64_t J = 0; J <= c->cells[1]; J++) {
                 const int64_t at = m * c->size + K * c->plane + J * c->stride;
@@ -132,7 +133,7 @@ static inline __attribute__((always_inline)) void prolong_any(const uz_brick_lev
 {
     const uz_brick_axis *to = f->to;
     float *const out = line + f->stride + UZ_BRICK_PAD;
-    for (int m = 0; m < 3; m++)
+    for (int m = 0; m < f->axes; m++)
         for (int64_t j = 0; j <= f->cells[1]; j++) {
             const float *restrict free = inverse + m * f->size + k * f->plane + j * f->stride, z = to[2].beyond[k],
                                   y = to[1].beyond[j];
@@ -190,7 +191,7 @@ static void prolong_slab(void *ctx, int slab)
     const int64_t planes = t->f->cells[2] + 1, end = uz_brick_slab(planes, slab + 1, t->slabs);
     for (int64_t k = uz_brick_slab(planes, slab, t->slabs); k < end; k++) {
         float *const x = t->v->x + k * t->f->plane;
-        for (int m = 0; m < 3; m++)
+        for (int m = 0; m < t->f->axes; m++)
             memset(x + m * t->f->size, 0, (size_t)t->f->plane * sizeof *x);
         uz_brick_prolong_plane(t->f, t->c, t->v->inverse, t->coarse->x, t->room->of[slab].line, k, x, t->f->size);
     }

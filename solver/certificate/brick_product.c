@@ -15,10 +15,10 @@
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* TOGETHER: rows of ke at a time, which do not wait for each other. */
+/* TOGETHER: rows of ke at a time, which do not wait for each other. DOFS: of a cell, at most. */
 enum { LANES = 4, TOGETHER = 8, NODES = UZ_BRICK_NODES, DOFS = UZ_BRICK_DOFS };
 
-/* In the order of ke. */
+/* In the order of ke, along the axes of a body; in the plane the first four. */
 static const int CORNER[NODES][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                      {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
@@ -33,6 +33,8 @@ typedef struct {
     const double *x;
     double *hi, *lo, *y;            /* y: 0 at first */
     double size[DOFS], begin[DOFS]; /* of multiply */
+    int64_t place[DOFS];            /* of a cell's dofs in its planes, from its first corner, */
+    int above[DOFS];                /* and in which of these */
     int slabs;
     planes of[UZ_ASIDE_MOST];
 } whole;
@@ -48,6 +50,11 @@ static bool make(whole *w, const uz_brick *brick)
               slabs = wanted < UZ_ASIDE_MOST ? wanted : UZ_ASIDE_MOST;
     *w = (whole){.brick = brick, .stride = (brick->cells[0] / LANES + 2) * LANES};
     w->plane = w->stride * (brick->cells[1] + 1);
+    for (int row = 0; row < brick->axes << brick->axes; row++) {
+        const int *corner = CORNER[row / brick->axes];
+        w->place[row] = row % brick->axes * w->plane + (brick->axes == 2 ? 0 : corner[1]) * w->stride + corner[0];
+        w->above[row] = corner[brick->axes - 1];
+    }
     w->slabs = slabs < most ? slabs : most < 2 ? 1 : (int)most;
     bool ok = true;
     for (int slab = 0; slab < w->slabs; slab++)
@@ -55,7 +62,7 @@ static bool make(whole *w, const uz_brick *brick)
             planes *of = &w->of[slab];
             double **all[] = {&of->x[k], &of->hi[k], &of->lo[k]};
             for (int i = 0; i < 3; i++)
-                ok = (*all[i] = uz_alloc_zero(3 * w->plane + LANES, sizeof(double))) && ok;
+                ok = (*all[i] = uz_alloc_zero(brick->axes * w->plane + LANES, sizeof(double))) && ok;
         }
     return ok;
 }
@@ -68,6 +75,13 @@ static void clear(whole *w)
         }
 }
 
+/* From the first corner of a cell to another one, where lines and planes of nodes are so far apart. */
+static int64_t step_to(int corner, int axes, int64_t line, int64_t plane)
+{
+    const int *at = CORNER[corner];
+    return at[0] + (axes == 2 ? at[1] * plane : at[1] * line + at[2] * plane);
+}
+
 /* Sums of a cell's row begin at a number that is at least BEYOND times each product: they stay between half of it and
  * twice as much, whatever the signs, so that what an addition rounds off is known from the sum before and after it
  * (docs/theory.md, rounding of sums). */
@@ -76,21 +90,22 @@ static void clear(whole *w)
 /* The products of a row are at most begin / BEYOND times the largest of the displacements, each times its size. */
 static void find_begins(whole *w)
 {
-    for (int j = 0; j < DOFS; j++)
-        w->size[j] = sqrt(w->brick->ke[(DOFS + 1) * j]);
-    for (int i = 0; i < DOFS; i++) {
+    const int n = w->brick->axes << w->brick->axes;
+    for (int j = 0; j < n; j++)
+        w->size[j] = sqrt(w->brick->ke[(n + 1) * j]);
+    for (int i = 0; i < n; i++) {
         double most = 0.0;
-        for (int j = 0; j < DOFS; j++)
-            most = fmax(most, fabs(w->brick->ke[DOFS * i + j]) / w->size[j]);
+        for (int j = 0; j < n; j++)
+            most = fmax(most, fabs(w->brick->ke[n * i + j]) / w->size[j]);
         w->begin[i] = BEYOND * most;
     }
 }
 
 /* The largest of the displacements, each times its size. */
-UZ_INLINE void find_largest(four *largest, const whole *w, const four *v)
+UZ_INLINE void find_largest(four *largest, const whole *w, const four *v, const int axes)
 {
     four most = {0.0};
-    for (int column = 0; column < DOFS; column++) {
+    for (int column = 0; column < axes << axes; column++) {
         const four size = (four)((bits)v[column] & INT64_MAX) * w->size[column];
         const bits more = size > most;
         most = (four)(((bits)size & more) | ((bits)most & ~more));
@@ -99,19 +114,20 @@ UZ_INLINE void find_largest(four *largest, const whole *w, const four *v)
 }
 
 /* Row by row, hi + lo = ke v for four cells; of these `count` are cells. */
-UZ_INLINE void multiply(four *hi, four *lo, const whole *w, const four *v, int count, int fused)
+UZ_INLINE void multiply(four *hi, four *lo, const whole *w, const four *v, int count, int fused, const int axes)
 {
+    const int dofs = axes << axes;
     four most;
-    find_largest(&most, w, v);
-    for (int row = 0; row < DOFS; row += TOGETHER) {
+    find_largest(&most, w, v, axes);
+    for (int row = 0; row < dofs; row += TOGETHER) {
         four sum[TOGETHER], rest[TOGETHER] = {{0}};
 #pragma GCC unroll 8
         for (int r = 0; r < TOGETHER; r++)
             sum[r] = w->begin[row + r] * most;
-        for (int column = 0; column < DOFS; column++) {
+        for (int column = 0; column < dofs; column++) {
 #pragma GCC unroll 8
             for (int r = 0; r < TOGETHER; r++) {
-                const double factor = w->brick->ke[(row + r) * DOFS + column];
+                const double factor = w->brick->ke[(row + r) * dofs + column];
                 const four product = factor * v[column];
                 four next = sum[r] + product, error = {0.0};
                 for (int l = 0; fused && l < LANES; l++)
@@ -135,22 +151,19 @@ UZ_INLINE void multiply(four *hi, four *lo, const whole *w, const four *v, int c
     }
 }
 
-UZ_INLINE void layer(const whole *w, const planes *p, int fused)
+UZ_INLINE void layer(const whole *w, const planes *p, int fused, const int axes)
 {
-    const int64_t *cells = w->brick->cells;
-    for (int64_t j = 0; j < cells[1]; j++)
+    const int64_t *cells = w->brick->cells, rows = axes == 2 ? 1 : cells[1];
+    const int dofs = axes << axes;
+    for (int64_t j = 0; j < rows; j++)
         for (int64_t i = 0; i < cells[0]; i += LANES) {
             four v[DOFS], hi[DOFS], lo[DOFS];
-            for (int row = 0; row < DOFS; row++) {
-                const int *corner = CORNER[row / 3];
-                v[row] =
-                    *(const four *)(p->x[corner[2]] + row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0]);
-            }
-            multiply(hi, lo, w, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused);
-            for (int row = 0; row < DOFS; row++) {
-                const int *corner = CORNER[row / 3];
-                const int64_t at = row % 3 * w->plane + (j + corner[1]) * w->stride + i + corner[0];
-                four *to = (four *)(p->hi[corner[2]] + at), *low = (four *)(p->lo[corner[2]] + at);
+            for (int row = 0; row < dofs; row++)
+                v[row] = *(const four *)(p->x[w->above[row]] + w->place[row] + j * w->stride + i);
+            multiply(hi, lo, w, v, cells[0] - i < LANES ? (int)(cells[0] - i) : LANES, fused, axes);
+            for (int row = 0; row < dofs; row++) {
+                const int64_t at = w->place[row] + j * w->stride + i;
+                four *to = (four *)(p->hi[w->above[row]] + at), *low = (four *)(p->lo[w->above[row]] + at);
                 const four before = *to, sum = before + hi[row], back = sum - before;
                 *low += ((before - (sum - back)) + (hi[row] - back)) + lo[row];
                 *to = sum;
@@ -158,34 +171,46 @@ UZ_INLINE void layer(const whole *w, const planes *p, int fused)
         }
 }
 
-UZ_AVX2_FMA static void layer_fused(const whole *w, const planes *p)
+UZ_AVX2_FMA static void solid_fused(const whole *w, const planes *p)
 {
-    layer(w, p, 1);
+    layer(w, p, 1, 3);
 }
 
-static void layer_split(const whole *w, const planes *p)
+static void solid_split(const whole *w, const planes *p)
 {
-    layer(w, p, 0);
+    layer(w, p, 0, 3);
+}
+
+UZ_AVX2_FMA static void plane_fused(const whole *w, const planes *p)
+{
+    layer(w, p, 1, 2);
+}
+
+static void plane_split(const whole *w, const planes *p)
+{
+    layer(w, p, 0, 2);
 }
 
 static void read_plane(const whole *w, double *plane, int64_t k)
 {
+    const int axes = w->brick->axes;
     const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
-    const int64_t *dof = w->brick->dof + 3 * line * lines * k;
+    const int64_t *dof = w->brick->dof + axes * line * lines * k;
     for (int64_t j = 0; j < lines; j++)
-        for (int64_t i = 0; i < line; i++, dof += 3)
-            for (int c = 0; c < 3; c++)
+        for (int64_t i = 0; i < line; i++, dof += axes)
+            for (int c = 0; c < axes; c++)
                 plane[c * w->plane + j * w->stride + i] = dof[c] >= 0 ? w->x[dof[c]] : 0.0;
 }
 
 /* The plane's sums go to the dofs. */
 static void write_plane(const whole *w, const planes *p, int64_t k)
 {
+    const int axes = w->brick->axes;
     const int64_t line = w->brick->cells[0] + 1, lines = w->brick->cells[1] + 1;
-    const int64_t *dof = w->brick->dof + 3 * line * lines * k;
+    const int64_t *dof = w->brick->dof + axes * line * lines * k;
     for (int64_t j = 0; j < lines; j++)
-        for (int64_t i = 0; i < line; i++, dof += 3)
-            for (int c = 0; c < 3; c++) {
+        for (int64_t i = 0; i < line; i++, dof += axes)
+            for (int c = 0; c < axes; c++) {
                 const int64_t at = c * w->plane + j * w->stride + i;
                 if (dof[c] < 0)
                     continue;
@@ -208,15 +233,17 @@ static void go_up(const whole *w, planes *p)
     swap(p->x);
     swap(p->hi);
     swap(p->lo);
-    memset(p->hi[1], 0, (size_t)(3 * w->plane) * sizeof(double));
-    memset(p->lo[1], 0, (size_t)(3 * w->plane) * sizeof(double));
+    memset(p->hi[1], 0, (size_t)(w->brick->axes * w->plane) * sizeof(double));
+    memset(p->lo[1], 0, (size_t)(w->brick->axes * w->plane) * sizeof(double));
 }
 
 /* Threads share the planes of nodes in slabs. */
 static void multiply_slab(void *ctx, int slab)
 {
     whole *w = ctx;
-    void (*const of_layer)(const whole *, const planes *) = uz_cpu_has_avx2_fma() ? layer_fused : layer_split;
+    void (*const of_solid)(const whole *, const planes *) = uz_cpu_has_avx2_fma() ? solid_fused : solid_split;
+    void (*const of_plane)(const whole *, const planes *) = uz_cpu_has_avx2_fma() ? plane_fused : plane_split;
+    void (*const of_layer)(const whole *, const planes *) = w->brick->axes == 2 ? of_plane : of_solid;
     const int64_t cells = w->brick->cells[2], first = (cells + 1) * slab / w->slabs,
                   end = (cells + 1) * (slab + 1) / w->slabs;
     planes *p = &w->of[slab];
@@ -236,7 +263,8 @@ static void multiply_slab(void *ctx, int slab)
 /* Lines of nodes along x where c is not zero. */
 static bool find_lines(bool *some, const uz_brick *brick, const double *c)
 {
-    const int64_t *n = brick->cells, numbers = 3 * (n[0] + 1), lines = (n[1] + 1) * (n[2] + 1), *dof = brick->dof;
+    const int64_t *n = brick->cells, numbers = brick->axes * (n[0] + 1), lines = (n[1] + 1) * (n[2] + 1),
+                  *dof = brick->dof;
     bool any = false;
     for (int64_t line = 0; line < lines; line++, dof += numbers) {
         some[line] = false;
@@ -250,25 +278,26 @@ static bool find_lines(bool *some, const uz_brick *brick, const double *c)
 /* y += K c, of the cells where c is not zero. */
 static void add_sparse(double *y, const uz_brick *brick, const double *c, const bool *some)
 {
-    const int64_t *n = brick->cells, line = n[0] + 1, lines = n[1] + 1, plane = line * lines;
+    const int axes = brick->axes, dofs = axes << axes;
+    const int64_t *n = brick->cells, line = n[0] + 1, lines = n[1] + 1, plane = line * lines,
+                  rows = axes == 2 ? 1 : n[1], beside = rows < lines ? 1 : 0; /* lines to the one across a row */
     for (int64_t k = 0; k < n[2]; k++)
-        for (int64_t j = 0; j < n[1]; j++) {
+        for (int64_t j = 0; j < rows; j++) {
             const bool *below = some + k * lines + j, *above = below + lines;
-            for (int64_t i = 0; (below[0] || below[1] || above[0] || above[1]) && i < n[0]; i++) {
+            for (int64_t i = 0; (below[0] || below[beside] || above[0] || above[beside]) && i < n[0]; i++) {
                 const int64_t *dof[DOFS];
                 double v[DOFS];
                 bool any = false;
-                for (int row = 0; row < DOFS; row++) {
-                    const int *corner = CORNER[row / 3];
-                    dof[row] =
-                        brick->dof + 3 * ((k + corner[2]) * plane + (j + corner[1]) * line + i + corner[0]) + row % 3;
+                for (int row = 0; row < dofs; row++) {
+                    const int64_t node = k * plane + j * line + i + step_to(row / axes, axes, line, plane);
+                    dof[row] = brick->dof + axes * node + row % axes;
                     v[row] = *dof[row] >= 0 ? c[*dof[row]] : 0.0;
                     any = any || v[row] != 0.0;
                 }
-                for (int row = 0; any && row < DOFS; row++) {
+                for (int row = 0; any && row < dofs; row++) {
                     double sum = 0.0;
-                    for (int column = 0; column < DOFS; column++)
-                        sum += brick->ke[row * DOFS + column] * v[column];
+                    for (int column = 0; column < dofs; column++)
+                        sum += brick->ke[row * dofs + column] * v[column];
                     if (*dof[row] >= 0)
                         y[*dof[row]] += sum;
                 }

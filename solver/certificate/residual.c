@@ -393,7 +393,7 @@ static void count_terms(void *ctx, int64_t begin, int64_t end)
     const uz_csc *K = x->K, *N = x->N;
     int64_t *count = x->count;
     for (int64_t j = begin; j < end; j++) {
-        const int64_t own = x->brick ? UZ_BRICK_NODES * UZ_BRICK_DOFS : K->ptr[j + 1] - K->ptr[j];
+        const int64_t own = x->brick ? x->brick->axes << 2 * x->brick->axes : K->ptr[j + 1] - K->ptr[j];
         count[j] += own + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
             count[K->idx[k]] += K->idx[k] != j;

@@ -97,7 +97,7 @@ static void measure_sweeps(void)
 
 static void measure_cells(void)
 {
-    of_cells = uz_brick_rate();
+    of_cells = uz_brick_rate(3);
 }
 
 /* Only who may take a multigrid waits for its rate. */

@@ -324,7 +324,7 @@ int bench_predictions_child(const char *which)
            asking, asked.seconds, cold.cost.seconds, cold.seconds, cached.cost.seconds, cached.seconds, cold.order,
            cold.made, cold.iterated, cold.certified, cached.iterated, cold.cost.bytes, cold.cost.actual_bytes, peak,
            (long long)asked.factor_nnz, uz_cost_machine()->flop_s, uz_cost_machine()->entry_s, uz_amg_rate(),
-           uz_brick_rate());
+           uz_brick_rate(3));
     uz_cache_free(cache);
     return 0;
 }

@@ -278,7 +278,7 @@ TEST(smoothers_are_made_for_the_largest_eigenvalue)
             uz_body_model whole = build_body(&scene), by_cells;
             CHECK(uz_body_model_build(&by_cells, &scene, UZ_BODY_CELLS, NULL) == UZ_OK);
             uz_brick_smoother smoother;
-            uz_brick_smoother_init(&smoother, cells[k], by_cells.brick->ke, 1.0, (bool[3]){true, true, true});
+            uz_brick_smoother_init(&smoother, 3, cells[k], by_cells.brick->ke, 1.0, (bool[3]){true, true, true});
             const double found = largest_found(&whole.K), most = smoother.most;
             CHECK_MSG(found <= most && most <= 1.25 * found, "%zu, %d: %g for %g", k, of, most, found);
             uz_body_model_clear(&whole);

@@ -257,11 +257,11 @@ TEST(cycles_have_rates_of_their_own)
     double sweep = INFINITY, step = INFINITY, least_sweep = INFINITY, least_step = INFINITY;
     for (int k = 0; k < 3; k++) {
         sweep = fmin(sweep, uz_amg_rate());
-        step = fmin(step, uz_brick_rate());
+        step = fmin(step, uz_brick_rate(3));
     }
     for (int k = 0; k < 3; k++) {
         least_sweep = fmin(least_sweep, uz_amg_rate());
-        least_step = fmin(least_step, uz_brick_rate());
+        least_step = fmin(least_step, uz_brick_rate(3));
     }
     CHECK_MSG(sweep > 2e-11 && sweep < 1e-7 && step > 1e-10 && step < 1e-6, "%g, %g s", sweep, step);
     CHECK_MSG(least_sweep < 2.0 * sweep && sweep < 2.0 * least_sweep, "%g, %g s", sweep, least_sweep);
