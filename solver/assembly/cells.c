@@ -1,4 +1,4 @@
-/* cells.c: bodies whose K need not be assembled: boxes of equal hexahedra. */
+/* cells.c: bodies whose K need not be assembled: boxes of equal hexahedra or, in the plane, quadrilaterals. */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -8,14 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A box of equal hex8 of one isotropic material, its dofs along the axes, held by supports alone. */
+/* A box of equal hex8 or, in the plane, quad4 of one isotropic material, its dofs along the axes, held by supports
+ * alone. */
 static bool has_equal_cells(const uz_body_model *model, const uz_scene *scene)
 {
     const uz_mesh *mesh = &model->mesh;
     const int64_t *cells = scene->box.cells;
-    return scene->source == UZ_MESH_BOX && model->kind == UZ_SOLID && mesh->uniform && !mesh->hangs &&
-           mesh->kind[0] == UZ_HEX8 && !model->materials[0].lame.general &&
-           mesh->n_elements == cells[0] * cells[1] * cells[2] && !model->material_of && !model->spring &&
+    const bool solid = model->kind == UZ_SOLID;
+    return scene->source == UZ_MESH_BOX && model->kind != UZ_AXISYMMETRIC && mesh->uniform && !mesh->hangs &&
+           mesh->kind[0] == (solid ? UZ_HEX8 : UZ_QUAD4) && !model->materials[0].lame.general &&
+           mesh->n_elements == cells[0] * cells[1] * (solid ? cells[2] : 1) && !model->material_of && !model->spring &&
            model->info.n_rotated == 0 && !model->place && model->n_rigid == 0;
 }
 

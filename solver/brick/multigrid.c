@@ -569,13 +569,15 @@ static const uz_multigrid_kind KIND = {.apply = apply,
                                        .start = uz_brick_start,
                                        .free = free_multigrid};
 
-/* A room in single precision, four numbers a dof of all grids; the factor of the last; with dofs held both again. */
+/* A room in single precision, four numbers a dof of all grids; the factor of the last; with dofs held both again; and
+ * for threads their planes, whose lines in the plane are padded twice and have sums of their size. */
 double uz_brick_predict_bytes(const uz_brick *brick)
 {
-    const double line = brick->axes * (double)uz_brick_stride(brick->cells[0]),
-                 padded = line * (double)((brick->cells[1] + 1) * (brick->cells[2] + 1));
-    return 4.0 * 5.0 * (brick->axes == 2 ? 1.5 : 1.25) * padded + 16.0 * FEW_DOFS * FEW_DOFS +
-           192.0 * line * (double)(brick->cells[1] + 1);
+    const bool plane = brick->axes == 2;
+    const double stride = (double)uz_brick_stride(brick->cells[0]) + (plane ? UZ_BRICK_PAD : 0),
+                 line = brick->axes * stride * (double)(brick->cells[1] + 1),
+                 padded = line * (double)(brick->cells[2] + 1);
+    return 4.0 * 5.0 * (plane ? 1.5 : 1.25) * padded + 16.0 * FEW_DOFS * FEW_DOFS + (plane ? 400.0 : 192.0) * line;
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)

@@ -42,14 +42,6 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 #define BADLY  2.2
 #define SECOND 0.75
 
-/* On equal cells: making the multigrid and bounding the spectrum, and a load that begins on coarser grids, in steps of
- * the smoother. Solid bodies of 100,000 to 810,000 dofs. */
-#define CELLS_CREATE  225.0
-#define CELLS_LOAD    170.0
-#define CELLS_GROWTH  0.06
-#define CELLS_FLOPS   40.0 /* for each dof, of what is as much as a step */
-#define CELLS_VECTORS 25.0
-
 /* Steps of solids that resist changes of volume, by their firmness, of stretched elements, and of long bodies, over
  * those of the same body of cubes at a Poisson's ratio of 0.3: powers of these, measured at 0.45, 0.49, elements 10
  * times as long along one axis, and cubes of them in bodies as long. Without a matrix what is stretched is coarsened
@@ -57,14 +49,24 @@ static const cycle_costs PLANE = {{1.7, 41.0, 0.0}, {4.0, 19.0, 0.2}, 40.0, 10.0
 typedef struct {
     double firmness, stretch, slender;
 } hardness;
-static const hardness MAKING = {0.4, 1.3, 0.0}, LOADING = {0.24, 0.3, 0.7}, MAKING_CELLS = {0.45, 0.35, 0.0},
-                      LOADING_CELLS = {0.29, 0.3, 0.2};
+static const hardness MAKING = {0.4, 1.3, 0.0}, LOADING = {0.24, 0.3, 0.7};
 #define CUBES_STRETCH 2.0 /* about the square root of 3, somewhat moved */
 /* Aggregates of irregular tetrahedra are rougher than those of a grid's: steps of the multigrid, and of loads, with
  * nine guesses for seven; where nothing touches these are a third of it. Eight meshes of tet4 and tet10 of 40,000 to
  * 130,000 dofs by Gmsh: blocks with a hole, angles, shafts. */
 #define IRREGULAR_MAKING  1.85
 #define IRREGULAR_LOADING 2.5
+
+/* On equal cells: making the multigrid and bounding the spectrum, a load that begins on coarser grids, in steps of the
+ * smoother, and vectors. Solid bodies of 100,000 to 810,000 dofs, plane ones of 15,000 to 1,500,000. */
+typedef struct {
+    double create, load, growth, vectors;
+    hardness making, loading;
+} cells_costs;
+static const cells_costs PLANE_CELLS = {373.0, 212.0, 0.1, 26.0, {0.4, 0.0, 0.07}, {0.29, 0.0, 0.35}},
+                         SOLID_CELLS = {225.0, 170.0, 0.06, 25.0, {0.45, 0.35, 0.0}, {0.29, 0.3, 0.2}};
+#define CELLS_FLOPS 40.0 /* for each dof, of what is as much as a step */
+#define CELLS_CYCLE 20.0 /* a cycle and a product, with the vectors */
 
 static double find_hardness(const uz_cost_size *size, hardness of)
 {
@@ -85,13 +87,15 @@ static double find_work(const uz_cost_size *size, const cycle_cost *of)
 
 static void add_cost_by_cells(uz_cost_estimate *cost, const uz_cost_size *size, const uz_cost_rates *rates)
 {
-    const double step = (double)size->d * rates->cycle_s * find_growth(size, CELLS_GROWTH),
-                 create = CELLS_CREATE * find_hardness(size, MAKING_CELLS),
-                 load = CELLS_LOAD * find_hardness(size, LOADING_CELLS);
+    const cells_costs *of = size->modes == UZ_MODES_MOST ? &SOLID_CELLS : &PLANE_CELLS;
+    const double step = (double)size->d * rates->cycle_s * find_growth(size, of->growth),
+                 create = of->create * find_hardness(size, of->making),
+                 steps = size->bounds || size->m == 0 ? 0.0 : UZ_COST_ITERATIONS * CHANGE_CYCLES * CELLS_CYCLE,
+                 load = (of->load + steps) * find_hardness(size, of->loading);
     cost->setup_s += create * step;
     cost->case_s += load * step;
     cost->flops += (create + load) * CELLS_FLOPS * (double)size->d;
-    cost->bytes += size->by_cells + 8.0 * CELLS_VECTORS * (double)size->d;
+    cost->bytes += size->by_cells + 8.0 * of->vectors * (double)size->d;
 }
 
 void uz_cost_of_multigrid(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,

@@ -88,24 +88,34 @@ const uz_cost_rates *uz_cost_machine(void)
     return &measured;
 }
 
-static double of_sweeps, of_cells; /* likewise, each under its own */
+static double of_sweeps, of_cells[2]; /* likewise, each under its own; of solids, and of plane bodies */
 
 static void measure_sweeps(void)
 {
     of_sweeps = uz_amg_rate();
 }
 
-static void measure_cells(void)
+static void measure_solid_cells(void)
 {
-    of_cells = uz_brick_rate(3);
+    of_cells[0] = uz_brick_rate(3);
 }
 
-/* Only who may take a multigrid waits for its rate. */
-static double cycle_rate(bool cells)
+static void measure_plane_cells(void)
 {
-    static pthread_once_t sweeps_guard = PTHREAD_ONCE_INIT, cells_guard = PTHREAD_ONCE_INIT;
-    pthread_once(cells ? &cells_guard : &sweeps_guard, cells ? measure_cells : measure_sweeps);
-    return cells ? of_cells : of_sweeps;
+    of_cells[1] = uz_brick_rate(2);
+}
+
+/* Only who may take a multigrid waits for its rate. brick: NULL where there is a matrix. */
+static double cycle_rate(const uz_brick *brick)
+{
+    static pthread_once_t sweeps = PTHREAD_ONCE_INIT, solid = PTHREAD_ONCE_INIT, plane = PTHREAD_ONCE_INIT;
+    if (!brick) {
+        pthread_once(&sweeps, measure_sweeps);
+        return of_sweeps;
+    }
+    const bool flat = brick->axes == 2;
+    pthread_once(flat ? &plane : &solid, flat ? measure_plane_cells : measure_solid_cells);
+    return of_cells[flat];
 }
 
 /* Beyond what a core has for itself entries come from memory: their rate is that of K, which is there. From so many
@@ -178,14 +188,15 @@ double uz_cost_analysis_bytes(const uz_cost_size *size)
 }
 
 /* Longest over shortest distance of an element's corners: sqrt(3) of a cube, and of the tetrahedra that it is divided
- * into. Of a thousand elements, their geometric mean. */
+ * into, sqrt(2) of a square. Of a thousand elements, their geometric mean. */
 static double find_stretch(const uz_mesh *mesh, const uz_brick *brick)
 {
     const double *cell = brick ? brick->cell : NULL;
     double sum = 0.0;
     int64_t n = 0;
     if (cell)
-        return hypot(hypot(cell[0], cell[1]), cell[2]) / fmin(fmin(cell[0], cell[1]), cell[2]);
+        return hypot(hypot(cell[0], cell[1]), cell[2]) /
+               fmin(brick->axes == 2 ? INFINITY : cell[1], fmin(cell[0], cell[2]));
     for (int64_t e = 0; e < mesh->n_elements; e += 1 + mesh->n_elements / 1000, n++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         const int64_t *node = mesh->node + mesh->first[e];
@@ -203,7 +214,7 @@ static double find_stretch(const uz_mesh *mesh, const uz_brick *brick)
     return n > 0 ? exp(sum / (double)n) : 1.0;
 }
 
-/* Of the box around it. */
+/* Of the box around it, which of a plane body has no third side. */
 static double find_slender(const uz_mesh *mesh, const uz_brick *brick)
 {
     double side[3] = {0.0};
@@ -221,13 +232,13 @@ static double find_slender(const uz_mesh *mesh, const uz_brick *brick)
 
 /* How much more a solid resists a change of volume than one of shape, over what it does at a Poisson's ratio of 0.3: of
  * the material where that is most. Linear tetrahedra, whose shapes are hardly free to keep their volume, show the root
- * of it. */
+ * of it, and plane stress nothing. */
 static double find_firmness(const uz_scene *scene, const uz_mesh *mesh, const uz_brick *brick)
 {
     const bool tetrahedra =
         !brick && mesh->n_elements > 0 && uz_element_type_of((uz_element_kind)mesh->kind[0])->nodes == 4;
     double most = 1.0;
-    for (int64_t k = 0; k < scene->n_materials; k++) {
+    for (int64_t k = 0; scene->model != UZ_PLANE_STRESS && k < scene->n_materials; k++) {
         const double nu = scene->materials[k].poisson;
         most = fmax(most, (1.0 - nu) / (1.0 - 2.0 * nu) / (0.7 / 0.4));
     }
@@ -265,7 +276,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
     const bool by_auto = settings->method == UZ_METHOD_AUTO && settings->stopping == UZ_STOP_CERTIFIED;
     const bool by_active_set = by_auto || settings->method == UZ_METHOD_ACTIVE_SET;
     const uz_brick *brick = model ? model->brick : NULL;
-    const bool solid = model && model->mesh.dim == 3;
+    const bool solid = model && model->mesh.dim == 3, shaped = solid || brick;
     return (uz_cost_size){.d = N->cols,
                           .m = N->rows,
                           .n_b = n_b,
@@ -276,12 +287,12 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .bounds = by_active_set && uz_csc_is_single(N),
                           .alone = settings->op != UZ_OPERATOR_AUTO && !uz_dual_form_of(settings->op)->can.needs_factor,
                           .by_cells = brick ? uz_brick_predict_bytes(brick) : 0.0,
-                          .stretch = solid ? find_stretch(&model->mesh, brick) : 1.0,
-                          .slender = solid ? find_slender(&model->mesh, brick) : 1.0,
-                          .firmness = solid ? find_firmness(scene, &model->mesh, brick) : 1.0,
+                          .stretch = shaped ? find_stretch(&model->mesh, brick) : 1.0,
+                          .slender = shaped ? find_slender(&model->mesh, brick) : 1.0,
+                          .firmness = shaped ? find_firmness(scene, &model->mesh, brick) : 1.0,
                           .irregular = solid && !brick && is_irregular(&model->mesh),
                           .entry_s = brick ? 0.0 : rate_of(K),
-                          .cycle_s = brick || is_large(K) ? cycle_rate(brick != NULL) : 0.0,
+                          .cycle_s = brick || is_large(K) ? cycle_rate(brick) : 0.0,
                           .cases = cases};
 }
 

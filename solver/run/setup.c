@@ -25,13 +25,15 @@ static bool is_along_axis(const double n[3])
     return (n[0] != 0.0) + (n[1] != 0.0) + (n[2] != 0.0) == 1;
 }
 
-/* A box of equal hex8 whose supports and obstacles are along the axes, as far as the scene itself tells. */
+/* A box of equal hex8, or in the plane quad4, whose supports and obstacles are along the axes, as far as the scene
+ * itself tells. */
 static bool has_cells(const uz_scene *scene)
 {
     const uz_box *box = &scene->box;
-    bool has = scene->source == UZ_MESH_BOX && scene->model == UZ_SOLID && scene->n_materials == 1 && !scene->place &&
-               !box->automatic && strncmp(box->element, "hex8", sizeof box->element) == 0;
-    for (int c = 0; has && c < 3; c++)
+    const char *element = scene->model == UZ_SOLID ? "hex8" : "quad4";
+    bool has = scene->source == UZ_MESH_BOX && scene->model != UZ_AXISYMMETRIC && scene->n_materials == 1 &&
+               !scene->place && !box->automatic && strncmp(box->element, element, sizeof box->element) == 0;
+    for (int c = 0; has && c < box->dim; c++)
         has = box->grading[c] == 0.0 || box->grading[c] == 1.0;
     for (int64_t i = 0; has && i < scene->n_supports; i++)
         has = scene->supports[i].kind == UZ_SUPPORT_COMPONENTS ||
@@ -39,6 +41,17 @@ static bool has_cells(const uz_scene *scene)
     for (int64_t k = 0; has && k < scene->n_contacts; k++)
         has = scene->contacts[k].kind == UZ_OBSTACLE_PLANE && is_along_axis(scene->contacts[k].normal);
     return has;
+}
+
+/* Are cells the better choice? */
+static bool are_worth_it(const uz_problem *problem)
+{
+    const uz_scene *scene = &problem->scene;
+    const uz_box *box = &scene->box;
+    double dofs = box->dim;
+    for (int c = 0; c < box->dim; c++)
+        dofs *= (double)box->cells[c] + 1.0;
+    return box->dim == 3 && dofs >= MANY_DOFS;
 }
 
 uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *settings)
@@ -50,10 +63,7 @@ uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *set
     if (!(free_asked || by_auto) || problem->kind != UZ_PROBLEM_SCENE || problem->n_quantities > 0 ||
         scene->kinematics == UZ_KINEMATICS_MOVING || !has_cells(scene))
         return UZ_BODY_SUPPORTED;
-    double dofs = 3.0;
-    for (int c = 0; c < 3; c++)
-        dofs *= (double)scene->box.cells[c] + 1.0;
-    return free_asked || dofs >= MANY_DOFS ? UZ_BODY_CELLS : UZ_BODY_SUPPORTED;
+    return free_asked || are_worth_it(problem) ? UZ_BODY_CELLS : UZ_BODY_SUPPORTED;
 }
 
 uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,

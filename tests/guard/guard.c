@@ -80,6 +80,8 @@ static bool fixed(state *s, int64_t nx, uz_operator op, int64_t iterations)
 {
     if (!paper_body(s, nx))
         return false;
+    if (op == UZ_OPERATOR_MATRIX_FREE) /* cells that are not equal, so that it has a matrix */
+        s->problem.scene.box.grading[0] = 1.01;
     s->settings.method = UZ_METHOD_ACCELERATED_RESTART;
     s->settings.op = op;
     s->settings.relative_error = 0.0;

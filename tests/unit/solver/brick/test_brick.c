@@ -17,15 +17,20 @@ __attribute__((constructor)) static void settle_threads(void)
     uz_process_init(2);
 }
 
-/* A block held on the left, pressed from above on a plane under it, and pulled. */
+/* A block held on the left, pressed from above on a plane under it, and pulled; nz 0: a plane body, of soft material in
+ * plane strain. */
 static uz_scene block_scene(int64_t nx, int64_t ny, int64_t nz, double poisson)
 {
     uz_scene scene = box_scene(60, 20, nx, ny);
-    scene.model = UZ_SOLID;
-    scene.box.dim = 3;
-    scene.box.size[2] = 30;
-    scene.box.cells[2] = nz;
-    snprintf(scene.box.element, sizeof scene.box.element, "hex8");
+    if (nz > 0) {
+        scene.model = UZ_SOLID;
+        scene.box.dim = 3;
+        scene.box.size[2] = 30;
+        scene.box.cells[2] = nz;
+        snprintf(scene.box.element, sizeof scene.box.element, "hex8");
+    } else if (poisson > 0.3) {
+        scene.model = UZ_PLANE_STRAIN;
+    }
     scene.materials[0].poisson = poisson;
     add_support(&scene, "left", 0, 0);
     scene.supports[0].u[2] = 0;
@@ -75,7 +80,8 @@ static uz_multigrid *multigrid_of(const uz_body_model *model)
 
 TEST(products_are_those_of_the_matrix)
 {
-    static const int64_t cells[][3] = {{1, 1, 1}, {2, 3, 1}, {7, 2, 3}, {8, 3, 2}, {9, 1, 4}, {16, 2, 2}};
+    static const int64_t cells[][3] = {{1, 1, 1}, {2, 3, 1}, {7, 2, 3}, {8, 3, 2}, {9, 1, 4}, {16, 2, 2},
+                                       {1, 1, 0}, {2, 5, 0}, {7, 3, 0}, {8, 4, 0}, {9, 1, 0}, {31, 2, 0}};
     for (size_t k = 0; k < sizeof cells / sizeof cells[0]; k++)
         for (int soft = 0; soft < 2; soft++) {
             twins t = make_twins(cells[k][0], cells[k][1], cells[k][2], soft ? 0.45 : 0.3);
@@ -106,10 +112,10 @@ TEST(products_are_those_of_the_matrix)
 
 TEST(energies_of_cells_are_those_of_elements)
 {
-    static const int64_t cells[][3] = {{1, 1, 1}, {9, 2, 3}, {20, 12, 24}};
+    static const int64_t cells[][3] = {{1, 1, 1}, {9, 2, 3}, {20, 12, 24}, {1, 1, 0}, {9, 2, 0}, {130, 90, 0}};
     for (size_t k = 0; k < sizeof cells / sizeof cells[0]; k++) {
         twins t = make_twins(cells[k][0], cells[k][1], cells[k][2], 0.3);
-        const int64_t n = 3 * t.whole.mesh.n_nodes;
+        const int64_t n = t.whole.mesh.dim * t.whole.mesh.n_nodes;
         double *u = vector(n), want, got; /* supported dofs are moved, too */
         uz_error err = {0};
         fill(u, n, k + 1);
@@ -121,9 +127,9 @@ TEST(energies_of_cells_are_those_of_elements)
     }
 }
 
-TEST(moved_supports_load_the_body_alike)
+static void check_moved_supports(int64_t nz)
 {
-    twins t = make_twins(5, 3, 4, 0.3);
+    twins t = make_twins(5, 3, nz, 0.3);
     uz_error err = {0};
     t.scene.supports[0].u[0] = 0.01;
     t.scene.supports[0].u[2] = -0.02;
@@ -143,12 +149,29 @@ TEST(moved_supports_load_the_body_alike)
     free_twins(&t);
 }
 
-/* hi + lo of K x, cell by cell in quadruple precision. */
-TEST(residuals_are_exact_to_twice_the_precision)
+TEST(moved_supports_load_the_body_alike)
 {
-    twins t = make_twins(6, 2, 3, 0.3);
+    check_moved_supports(4);
+    check_moved_supports(0);
+}
+
+/* The dof of a cell's matrix, cells and its nodes by component. */
+static int64_t dof_of(const uz_brick *brick, const int64_t cell[3], int row)
+{
+    int64_t node = 0, step = 1;
+    for (int c = 0; c < brick->axes; c++) {
+        node += (cell[c] + uz_brick_corner[row / brick->axes][c]) * step;
+        step *= brick->cells[uz_brick_axis_of(brick->axes, c)] + 1;
+    }
+    return brick->dof[brick->axes * node + row % brick->axes];
+}
+
+/* hi + lo of K x, cell by cell in quadruple precision. */
+static void check_residuals(int64_t nz)
+{
+    twins t = make_twins(6, 2, nz, 0.3);
     const uz_brick *brick = t.cells.brick;
-    const int64_t d = t.cells.d, m = t.cells.m, line = brick->cells[0] + 1, plane = line * (brick->cells[1] + 1);
+    const int64_t d = t.cells.d, m = t.cells.m;
     double *u = vector(d), *c = vector(d), *p = vector(d), *r = vector(m);
     uz_residuals got = {vector(d), vector(d), vector(d), vector(d), vector(d), brick};
     __float128 *want = calloc((size_t)d, sizeof *want), *changed = calloc((size_t)d, sizeof *changed);
@@ -160,22 +183,20 @@ TEST(residuals_are_exact_to_twice_the_precision)
         r[i] = -fabs(r[i]);
     for (int64_t j = 0; j < d; j++)
         c[j] = t.cells.N.ptr[j + 1] > t.cells.N.ptr[j] ? 1e-9 * u[d - 1 - j] : 0.0;
-    for (int64_t k = 0; k < brick->cells[2]; k++)
-        for (int64_t j = 0; j < brick->cells[1]; j++)
-            for (int64_t i = 0; i < brick->cells[0]; i++)
-                for (int row = 0; row < UZ_BRICK_DOFS; row++)
-                    for (int column = 0; column < UZ_BRICK_DOFS; column++) {
-                        const int *a = uz_brick_corner[row / 3], *b = uz_brick_corner[column / 3];
-                        const int64_t
-                            to = brick->dof[3 * ((k + a[2]) * plane + (j + a[1]) * line + i + a[0]) + row % 3],
-                            from = brick->dof[3 * ((k + b[2]) * plane + (j + b[1]) * line + i + b[0]) + column % 3];
-                        const double entry = brick->ke[row * UZ_BRICK_DOFS + column];
-                        if (to < 0 || from < 0)
-                            continue;
-                        want[to] += (__float128)entry * u[from];
-                        changed[to] += (__float128)entry * c[from];
-                        size[to] += fabs(entry * u[from]);
-                    }
+    const int dofs = uz_brick_dofs(brick->axes);
+    for (int64_t e = 0; e < t.cells.mesh.n_elements; e++) {
+        const int64_t *n = t.scene.box.cells, cell[3] = {e % n[0], e / n[0] % n[1], e / n[0] / n[1]};
+        for (int row = 0; row < dofs; row++)
+            for (int column = 0; column < dofs; column++) {
+                const int64_t to = dof_of(brick, cell, row), from = dof_of(brick, cell, column);
+                const double entry = brick->ke[row * dofs + column];
+                if (to < 0 || from < 0)
+                    continue;
+                want[to] += (__float128)entry * u[from];
+                changed[to] += (__float128)entry * c[from];
+                size[to] += fabs(entry * u[from]);
+            }
+    }
     for (int64_t j = 0; j < d; j++) /* what is left is far below double precision */
         p[j] = (double)want[j];
     CHECK(uz_equilibrium_residual(&got, &t.cells.K, &t.cells.N, p, u, c, r, &err) == UZ_OK);
@@ -199,10 +220,16 @@ TEST(residuals_are_exact_to_twice_the_precision)
     free_twins(&t);
 }
 
-/* r'M^-1 s = s'M^-1 r to single precision, r'M^-1 r > 0, zeros at held dofs; whatever was held before. */
-TEST(the_cycle_is_symmetric_with_dofs_held_too)
+TEST(residuals_are_exact_to_twice_the_precision)
 {
-    twins t = make_twins(12, 7, 10, 0.3);
+    check_residuals(3);
+    check_residuals(0);
+}
+
+/* r'M^-1 s = s'M^-1 r to single precision, r'M^-1 r > 0, zeros at held dofs; whatever was held before. */
+static void check_symmetry(int64_t nx, int64_t ny, int64_t nz)
+{
+    twins t = make_twins(nx, ny, nz, 0.3);
     const int64_t d = t.cells.d;
     uz_multigrid *mg = multigrid_of(&t.cells);
     uz_error err = {0};
@@ -242,6 +269,12 @@ TEST(the_cycle_is_symmetric_with_dofs_held_too)
     free_twins(&t);
 }
 
+TEST(the_cycle_is_symmetric_with_dofs_held_too)
+{
+    check_symmetry(12, 7, 10);
+    check_symmetry(45, 31, 0);
+}
+
 /* Powers reach the largest eigenvalue of diag(K)^-1 K from below. */
 static double largest_found(const uz_csc *K)
 {
@@ -269,7 +302,8 @@ static double largest_found(const uz_csc *K)
  */
 TEST(smoothers_are_made_for_the_largest_eigenvalue)
 {
-    static const int64_t cells[][3] = {{6, 6, 6}, {7, 5, 6}, {3, 4, 3}, {9, 2, 3}, {8, 1, 1}, {5, 1, 2}};
+    static const int64_t cells[][3] = {{6, 6, 6}, {7, 5, 6}, {3, 4, 3}, {9, 2, 3}, {8, 1, 1}, {5, 1, 2},
+                                       {6, 6, 0}, {7, 5, 0}, {3, 4, 0}, {9, 2, 0}, {8, 1, 0}, {6, 3, 0}};
     static const double poisson[] = {0, 0.3, 0.45, 0.499}, length[] = {60, 6};
     for (size_t k = 0; k < sizeof cells / sizeof cells[0]; k++)
         for (int of = 0; of < 8; of++) {
@@ -278,7 +312,8 @@ TEST(smoothers_are_made_for_the_largest_eigenvalue)
             uz_body_model whole = build_body(&scene), by_cells;
             CHECK(uz_body_model_build(&by_cells, &scene, UZ_BODY_CELLS, NULL) == UZ_OK);
             uz_brick_smoother smoother;
-            uz_brick_smoother_init(&smoother, 3, cells[k], by_cells.brick->ke, 1.0, (bool[3]){true, true, true});
+            uz_brick_smoother_init(&smoother, by_cells.brick->axes, by_cells.brick->cells, by_cells.brick->ke, 1.0,
+                                   (bool[3]){true, true, true});
             const double found = largest_found(&whole.K), most = smoother.most;
             CHECK_MSG(found <= most && most <= 1.25 * found, "%zu, %d: %g for %g", k, of, most, found);
             uz_body_model_clear(&whole);
@@ -320,11 +355,14 @@ TEST(iterations_do_not_grow_with_the_grid)
     } bodies[] = {
         {{40, 40, 40}, {8, 8, 8}},     {{40, 40, 40}, {16, 16, 16}},  {{40, 40, 40}, {24, 24, 24}},
         {{40, 40, 40}, {21, 19, 23}},  {{400, 40, 40}, {16, 16, 16}}, {{4, 40, 40}, {16, 16, 16}},
-        {{40, 400, 40}, {16, 16, 16}}, {{60, 20, 30}, {24, 5, 7}},
+        {{40, 400, 40}, {16, 16, 16}}, {{60, 20, 30}, {24, 5, 7}},    {{60, 20, 0}, {48, 16, 0}},
+        {{60, 20, 0}, {96, 32, 0}},    {{60, 20, 0}, {288, 96, 0}},   {{60, 20, 0}, {101, 35, 0}},
+        {{600, 20, 0}, {96, 32, 0}},   {{6, 20, 0}, {96, 32, 0}},     {{60, 60, 0}, {90, 7, 0}},
+        {{60, 60, 0}, {5, 150, 0}},
     };
     for (size_t k = 0; k < sizeof bodies / sizeof bodies[0]; k += (size_t)step_of_cases()) {
         for (int hard = 0; hard < 2; hard++) {
-            uz_scene scene = block_scene(2, 2, 2, hard ? 0.49 : 0.3);
+            uz_scene scene = block_scene(2, 2, bodies[k].cells[2], hard ? 0.49 : 0.3);
             double lambda;
             memcpy(scene.box.size, bodies[k].size, sizeof scene.box.size);
             memcpy(scene.box.cells, bodies[k].cells, sizeof scene.box.cells);
@@ -375,8 +413,8 @@ static void check_solve(const uz_scene *scene, double relative_error)
 TEST(solves_agree_with_a_factor)
 {
     static const double poisson[] = {0.3, 0.45};
-    for (int k = 0; k < 2; k++) {
-        uz_scene scene = block_scene(12, 5, 7, poisson[k]);
+    for (int k = 0; k < 4; k++) {
+        uz_scene scene = k < 2 ? block_scene(12, 5, 7, poisson[k]) : block_scene(61, 20, 0, poisson[k - 2]);
         check_solve(&scene, 1e-6);
         scene.supports[0].u[0] = 0.002;
         check_solve(&scene, 1e-8);
@@ -397,10 +435,10 @@ static uz_result *solve_by_cells(const uz_scene *scene, double relative_error)
 
 /* Upside down the rows are upper bounds, not lower ones. In metres and pascals all but exponents stay. Coarser grids
  * leave few steps to the finest. */
-TEST(mirrored_and_in_other_units_the_answer_is_the_same)
+static void check_mirrored(int64_t nx, int64_t ny, int64_t nz)
 {
-    uz_scene scene = block_scene(24, 8, 12, 0.3), mirrored = block_scene(24, 8, 12, 0.3),
-             metres = block_scene(24, 8, 12, 0.3);
+    uz_scene scene = block_scene(nx, ny, nz, 0.3), mirrored = block_scene(nx, ny, nz, 0.3),
+             metres = block_scene(nx, ny, nz, 0.3);
     snprintf(mirrored.loads[0].on, sizeof mirrored.loads[0].on, "bottom");
     mirrored.loads[0].v[1] *= -1;
     snprintf(mirrored.contacts[0].on, sizeof mirrored.contacts[0].on, "top");
@@ -408,6 +446,7 @@ TEST(mirrored_and_in_other_units_the_answer_is_the_same)
     mirrored.contacts[0].normal[1] = -1;
     for (int c = 0; c < 3; c++)
         metres.box.size[c] *= 1e-3;
+    metres.thickness *= 1e-3;
     metres.materials[0].young *= 1e6;
     for (int k = 0; k < 2; k++)
         for (int c = 0; c < 3; c++)
@@ -429,10 +468,16 @@ TEST(mirrored_and_in_other_units_the_answer_is_the_same)
     uz_scene_clear(&metres);
 }
 
-/* No row touches, or all do; and none is there. */
-TEST(bodies_far_from_the_plane_and_pressed_flat_on_it)
+TEST(mirrored_and_in_other_units_the_answer_is_the_same)
 {
-    uz_scene scene = block_scene(9, 4, 6, 0.3);
+    check_mirrored(24, 8, 12);
+    check_mirrored(120, 40, 0);
+}
+
+/* No row touches, or all do; and none is there. */
+static void check_far_and_flat(int64_t nx, int64_t ny, int64_t nz)
+{
+    uz_scene scene = block_scene(nx, ny, nz, 0.3);
     scene.contacts[0].point[1] = -1;
     uz_result *far = solve_by_cells(&scene, 1e-8);
     CHECK_INT(far->summary.active, 0);
@@ -448,6 +493,12 @@ TEST(bodies_far_from_the_plane_and_pressed_flat_on_it)
     CHECK_INT(linear->summary.method, UZ_METHOD_LINEAR);
     uz_result_free(linear);
     uz_scene_clear(&scene);
+}
+
+TEST(bodies_far_from_the_plane_and_pressed_flat_on_it)
+{
+    check_far_and_flat(9, 4, 6);
+    check_far_and_flat(40, 13, 0);
 }
 
 /* A body that only moves, of cells that hardly bend: what ends short of the request has no exact solve, as there is no
@@ -551,18 +602,18 @@ TEST(auto_gives_up_cells_that_their_multigrid_is_bad_for)
 }
 
 /* What is no box of equal cells with bounds is solved with its matrix, as before. */
-TEST(other_scenes_keep_their_matrix)
+static void check_others(int64_t nz)
 {
-    uz_scene scene = block_scene(4, 3, 3, 0.3);
+    uz_scene scene = block_scene(4, 3, nz, 0.3);
     uz_error err = {0};
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < (nz > 0 ? 4 : 5); k++) {
         uz_scene other = scene;
         uz_contact round = scene.contacts[0];
         uz_support springs[2] = {scene.supports[0], {.kind = UZ_SUPPORT_SPRING, .on = "right", .spring = {1, 1, 1}}};
         if (k == 0)
             other.box.grading[1] = 2;
         if (k == 1)
-            snprintf(other.box.element, sizeof other.box.element, "hex20");
+            snprintf(other.box.element, sizeof other.box.element, nz > 0 ? "hex20" : "quad8");
         if (k == 2) {
             round = (uz_contact){.on = "bottom", .kind = UZ_OBSTACLE_ROUND, .point = {30, -100, 15}, .radius = 100};
             other.contacts = &round;
@@ -571,11 +622,19 @@ TEST(other_scenes_keep_their_matrix)
             other.supports = springs;
             other.n_supports = 2;
         }
+        if (k == 4)
+            other.model = UZ_AXISYMMETRIC;
         uz_body_model model;
         CHECK_MSG(uz_body_model_build(&model, &other, UZ_BODY_CELLS, &err) == UZ_OK, "%s", err.message);
         CHECK(model.brick == NULL);
-        CHECK(model.K.ptr[model.d] > 8 * model.d);
+        CHECK(model.K.ptr[model.d] > (nz > 0 ? 8 : 4) * model.d);
         uz_body_model_clear(&model);
     }
     uz_scene_clear(&scene);
+}
+
+TEST(other_scenes_keep_their_matrix)
+{
+    check_others(3);
+    check_others(0);
 }

@@ -28,6 +28,14 @@ static uz_problem scene_problem(int64_t nx, int64_t ny)
     return (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(nx, ny)};
 }
 
+/* The same of cells that are not all equal, which has a matrix. */
+static uz_problem graded_problem(int64_t nx, int64_t ny)
+{
+    uz_problem problem = scene_problem(nx, ny);
+    problem.scene.box.grading[0] = 1.01;
+    return problem;
+}
+
 /* The scene as matrices: nothing is known of its mesh. */
 static uz_problem matrix_problem(int64_t nx, int64_t ny)
 {
@@ -102,7 +110,7 @@ TEST(iterations_with_inner_iterations)
 /* The least eigenvalue of the preconditioned matrix, with the obstacle's normal along (tilt, 1). */
 static double conditioning(double tilt)
 {
-    uz_problem problem = scene_problem(60, 20);
+    uz_problem problem = graded_problem(60, 20);
     uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
     uz_setup *setup = NULL;
     uz_reuse reused;
@@ -326,9 +334,8 @@ static const uz_cost_option *considered(const uz_summary *s, uz_operator op)
 }
 
 /* Rates are measured once, so that the predictions of one program compare. */
-TEST(gradient_steps_without_a_factor_are_known_to_be_many)
+static void check_gradient_steps(uz_problem problem)
 {
-    uz_problem problem = scene_problem(30, 10);
     uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-8);
     uz_prediction free, steps;
     uz_error err = {0};
@@ -343,9 +350,15 @@ TEST(gradient_steps_without_a_factor_are_known_to_be_many)
     uz_problem_clear(&problem);
 }
 
+TEST(gradient_steps_without_a_factor_are_known_to_be_many)
+{
+    check_gradient_steps(graded_problem(30, 10));
+    check_gradient_steps(scene_problem(30, 10)); /* by its cells */
+}
+
 TEST(what_does_not_fit_goes_on_without_a_factor)
 {
-    uz_problem problem = scene_problem(90, 30);
+    uz_problem problem = graded_problem(90, 30);
     uz_settings s = settings_for(UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 1e-8);
     uz_result *direct = solve_problem(&problem, &s);
     const uz_cost_option *with = considered(&direct->summary, UZ_OPERATOR_CONDENSED);
@@ -378,7 +391,7 @@ static void check_refused(const uz_problem *problem, uz_operator op, size_t limi
 
 TEST(what_fits_in_no_form_is_refused)
 {
-    uz_problem problem = scene_problem(90, 30);
+    uz_problem problem = graded_problem(90, 30);
     uz_settings s = settings_for(UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 1e-8);
     uz_result *result = solve_problem(&problem, &s);
     double with = considered(&result->summary, UZ_OPERATOR_CONDENSED)->bytes;
@@ -397,9 +410,10 @@ TEST(what_fits_in_no_form_is_refused)
 TEST(predicted_bytes_cover_what_is_used)
 {
     for (int64_t nx = 60; nx <= 120; nx += 30)
-        for (int k = 0; k < 3; k++) {
-            const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE};
-            uz_problem problem = scene_problem(nx, nx / 3);
+        for (int k = 0; k < 4; k++) {
+            const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE,
+                                         UZ_OPERATOR_MATRIX_FREE};
+            uz_problem problem = k == 2 ? graded_problem(nx, nx / 3) : scene_problem(nx, nx / 3);
             uz_settings s = settings_for(forms[k], UZ_METHOD_AUTO, 1e-6);
             uz_result *result = solve_problem(&problem, &s);
             const uz_cost *cost = &result->summary.cost;

@@ -404,10 +404,14 @@ TEST(matrices)
 /* Large enough for coarse levels. */
 TEST(matrix_free)
 {
-    uz_problem fine = scene_problem();
-    fine.scene.box.cells[0] = 30;
-    fine.scene.box.cells[1] = 20;
-    check_scenario("matrix-free scene", fine, UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO, false);
+    for (int graded = 0; graded < 2; graded++) { /* by its cells, and by a matrix */
+        uz_problem fine = scene_problem();
+        fine.scene.box.cells[0] = 30;
+        fine.scene.box.cells[1] = 20;
+        fine.scene.box.grading[0] = graded ? 1.01 : 1;
+        check_scenario(graded ? "matrix-free scene" : "matrix-free cells", fine, UZ_METHOD_AUTO,
+                       UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO, false);
+    }
     check_scenario("matrix-free rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO,
                    true);
     check_scenario("matrix-free independent rows", leaning_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE,
