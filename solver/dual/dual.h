@@ -59,6 +59,7 @@ typedef struct {
                      * theirs near these, which all press */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
+    bool carried;   /* the caller's: what an application leaves goes on with its answer, and should be less */
     bool equations; /* the caller's: rows of solve_active are to hold whatever they bear, and are no guess that may be
                      * seen to be wrong on the way */
     bool asked_lambda_max;         /* by uz_dual_load_lambda_max: others on the same body may have, too */

@@ -41,6 +41,9 @@
 #define FIRST_AIM    1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
+/* The same where the response is carried along from step to step: conjugate steps take 51 iterations for 808 on the
+ * paper's body of 60 x 20 cells. */
+#define CARRIED_KEPT 1e-4
 /* The same where the iterations are to be those of the exact operator, and an aim for the floor. */
 #define EXACT_CHANGE 1e-6
 #define EXACT_AIM    1e-11
@@ -286,7 +289,8 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
     uz_dual_load_energies(load, &psi, &norm2, r, Dr);
     const double norm = fmax(1e-3 * base, fmin(base, sqrt(norm2))); /* ||u(r)||_K about, with the last response */
-    uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, x->tight, FLOOR * x->aim * norm * root);
+    const double tight = load->carried ? fmin(x->tight, CARRIED_KEPT) : x->tight;
+    uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, tight, FLOOR * x->aim * norm * root);
     memset(x->right, 0, (size_t)dual->d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);
     status = uz_cg_solve(&info, x->sparse.response, &x->cg, load->K, x->right, &stop, err);

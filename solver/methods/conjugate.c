@@ -30,8 +30,8 @@
  * have made it a bad one. */
 #define RISE 1e-2
 
-/* Iterations after which D r is made again. */
-enum { SETTLED_FOR = 64 };
+/* Iterations after which D r is made again; and when it may miss so many times what an application leaves. */
+enum { SETTLED_FOR = 64, SETTLED_AT = 4 };
 
 /* Where there is no direction to go on from. */
 static void forget(uz_iterate *it)
@@ -79,8 +79,9 @@ static double make_direction(uz_iterate *it)
 
 /* Along d by the length that maximizes psi; true: it goes beyond `bound`, where the first row stops to press. Along
  * what is flat the step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far
- * as a plain one: rise / curvature would be the quotient of two roundings. */
-static bool take_direction(uz_iterate *it, double rise)
+ * as a plain one: rise / curvature would be the quotient of two roundings. near: the length along d of the point that D
+ * was applied to, of which `left` is missing: D r of another point has as much more of it as that is farther. */
+static bool take_direction(uz_iterate *it, double rise, double near, double left)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
     double curvature = 0.0, square = 0.0, bound = INFINITY, *reach = it->gamma; /* how far each row can go */
@@ -100,7 +101,7 @@ static bool take_direction(uz_iterate *it, double rise)
         length = rise / curvature;
     else if (isinf(bound))
         length = it->alpha;
-    const double taken = fmin(length, bound);
+    const double taken = fmin(length, bound), share = taken / near;
     const bool beyond = length > bound;
     for (int64_t i = 0; i < it->m; i++) {
         double r = it->r[i], Dr = it->Dr[i];
@@ -112,7 +113,18 @@ static bool take_direction(uz_iterate *it, double rise)
     }
     it->law->kind->project(it->law, it->r, it->m);
     it->tau = beyond ? 1.0 : 2.0;
+    it->length = taken;
+    it->missed = fabs(1.0 - share) * it->missed + share * left;
     return beyond;
+}
+
+/* Of points that D r is carried along from. */
+static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
+{
+    load->carried = true;
+    const uz_status status = uz_dual_load_apply(load, Dr, r, err);
+    load->carried = false;
+    return status;
 }
 
 /* The step to r_next, plain or to rho: not taken, true, where it is too long, or where it led down. */
@@ -126,6 +138,7 @@ static bool leave_projection(uz_iterate *it, const uz_dual_load *load, bool plai
     if (taken) {
         uz_iterate_swap(&it->r, &it->r_next);
         uz_iterate_swap(&it->Dr, &it->Dr_next);
+        it->missed = load->left;
     }
     forget(it);
     it->tau = taken ? 2.0 : 1.0;
@@ -159,20 +172,24 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
         forget(it);
     const bool along = it->tau > 1.0, plain = !along && memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
     /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near
-     * r, a plain step's length away. Where D is exact the difference of two points would only lose digits. */
+     * r, the last step's length away, or a plain one's: about where this one ends, as D r of its end is what they left
+     * there times the quotient of the lengths. Where D is exact the difference of two points would only lose digits. */
     const bool near = along && !load->dual->can->exact;
+    const double away = it->length > 0.0 ? it->length : it->alpha;
     const double rise = along ? make_direction(it) : 0.0;
     for (int64_t i = 0; !along && i < it->m; i++)
         it->r_next[i] = it->rho[i] + (plain ? it->step[i] * it->gamma[i] : 0.0);
     if (!along)
         it->law->kind->project(it->law, it->r_next, it->m);
     for (int64_t i = 0; near && i < it->m; i++)
-        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, near ? it->gamma : it->r_next, err);
+        it->gamma[i] = it->r[i] + away * it->r_next[i];
+    uz_status status = apply(load, it->Dr_next, near ? it->gamma : it->r_next, err);
     for (int64_t i = 0; near && status == UZ_OK && i < it->m; i++)
-        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
+        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / away;
     if (status == UZ_OK)
-        *restart = (along ? take_direction(it, rise) : leave_projection(it, load, plain)) || *restart;
+        *restart =
+            (along ? take_direction(it, rise, away, near ? load->left : 0.0) : leave_projection(it, load, plain)) ||
+            *restart;
     it->iteration++;
     it->restarts += *restart;
     make_gaps(it, load);
@@ -181,12 +198,14 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
 }
 
 /* Applies D to r: where a bound is `due`, which is of the r of the last apply, and every so often, as D r is carried
- * along from the directions and gathers rounding. */
+ * along from the directions and gathers rounding, and of inner iterations what they leave. */
 static uz_status settle(uz_iterate *it, uz_dual_load *load, bool due, uz_error *err)
 {
-    if (!due && it->iteration % SETTLED_FOR != 0)
+    if (!due && it->iteration % SETTLED_FOR != 0 && !(it->missed > SETTLED_AT * load->left))
         return UZ_OK;
-    return uz_dual_load_apply(load, it->Dr, it->r, err);
+    const uz_status status = apply(load, it->Dr, it->r, err);
+    it->missed = load->left;
+    return status;
 }
 
 static const uz_steps steps = {.step = step, .settle = settle, .rho_is_r = true};

@@ -210,7 +210,8 @@ void uz_iterate_swap(double **a, double **b)
 enum { APPLICATIONS = 4 };
 
 /* s'Ds <= s'W^-2 s / alpha for s = r(k+1) - rho? Of Dr(k+1) and of the two that Drho combines what inner iterations may
- * have left is taken off: alpha is within 1e-4 of the longest, and much less than that would look like a step too long.
+ * have left is taken off, and what one that was carried along misses: alpha is within 1e-4 of the longest, and much
+ * less than that would look like a step too long.
  */
 bool uz_iterate_shorten(uz_iterate *it, const uz_dual_load *load)
 {
@@ -221,7 +222,7 @@ bool uz_iterate_shorten(uz_iterate *it, const uz_dual_load *load)
         square += (s / w) * (s / w);
         size += (it->r_next[i] / w) * (it->r_next[i] / w);
     }
-    curvature -= APPLICATIONS * load->left * sqrt(square / it->alpha);
+    curvature -= (APPLICATIONS * load->left + it->missed) * sqrt(square / it->alpha);
     bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
     if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
         return false;

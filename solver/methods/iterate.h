@@ -40,9 +40,12 @@ struct uz_iterate {
     uz_origin origin;  /* what was taken of the caller's start */
     bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
-    bool along_ray;    /* the last conjugate step: psi rises along `ray`, no bound ends it, and D hardly curves it */
-    bool resumed;      /* another run's state, with the correction of its best answer made before D was prepared */
-    int32_t phase;     /* of auto */
+    /* Of conjugate steps where inner iterations make D r: the length of the last one, 0: there is none, and, in the
+     * energy norm, what Dr as it is carried along may miss. */
+    double length, missed;
+    bool along_ray; /* the last conjugate step: psi rises along `ray`, no bound ends it, and D hardly curves it */
+    bool resumed;   /* another run's state, with the correction of its best answer made before D was prepared */
+    int32_t phase;  /* of auto */
     int64_t phase_end;
     struct uz_milestones *milestones; /* where bounds are noted; NULL: nowhere */
     uz_best before; /* what was best before the last answer of a run that ended was bounded out of turn */

@@ -107,6 +107,26 @@ TEST(iterations_with_inner_iterations)
     uz_problem_clear(&problem);
 }
 
+/* Conjugate steps carry D r along, with all that inner iterations leave: were each step to make more of that, no
+ * direction would be one, and steps would seem too long. */
+TEST(conjugate_steps_keep_what_inner_iterations_leave_small)
+{
+    for (int64_t nx = 60; nx <= 120; nx += 30)
+        for (int graded = 0; graded < 2; graded++) {
+            uz_problem problem = graded ? graded_problem(nx, nx / 3) : scene_problem(nx, nx / 3);
+            uz_settings exactly = settings_for(UZ_OPERATOR_CONDENSED, UZ_METHOD_CONJUGATE, 1e-6),
+                        freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_CONJUGATE, 1e-6);
+            uz_result *want = solve_problem(&problem, &exactly), *got = solve_problem(&problem, &freely);
+            CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+            CHECK_REL(got->summary.alpha, want->summary.alpha, 1e-3);
+            CHECK_MSG(got->summary.iterations <= 4 * want->summary.iterations, "%lld steps for %lld at %lld",
+                      (long long)got->summary.iterations, (long long)want->summary.iterations, (long long)nx);
+            uz_result_free(want);
+            uz_result_free(got);
+            uz_problem_clear(&problem);
+        }
+}
+
 /* The least eigenvalue of the preconditioned matrix, with the obstacle's normal along (tilt, 1). */
 static double conditioning(double tilt)
 {
