@@ -59,6 +59,7 @@ typedef struct {
                      * theirs near these, which all press */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
+    bool begins;    /* the caller's: of D r at r = 0 no answer is made, as guesses of the active rows follow */
     bool carried;   /* the caller's: what an application leaves goes on with its answer, and should be less */
     bool equations; /* the caller's: rows of solve_active are to hold whatever they bear, and are no guess that may be
                      * seen to be wrong on the way */

@@ -66,7 +66,6 @@ typedef struct {
     bool unmeasured;   /* and while nobody has asked for it: its guess was seen to be wrong on the way, or pulls */
     bool cut;          /* known_r is without what pulled: known_u is the answer for it, but not to begin at */
     int refused;       /* guesses that were left to steps of the active set */
-    bool asked;        /* for D r, before */
     bool near;         /* box->u and box->r are near the answer, and nobody has begun there yet */
     bool started;      /* on coarser grids */
     double tight;      /* relative accuracy of a change of the response, */
@@ -269,10 +268,9 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
 {
     free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
-    bool begins = !x->asked && !x->probing; /* at r = 0, of which no answer is made */
+    bool begins = load->begins && !x->probing; /* at r = 0 */
     for (int64_t i = 0; i < dual->m && begins; i++)
         begins = r[i] == 0.0;
-    x->asked = true;
     /* a guess that is to be bounded at an end has its displacement, and there may be no time for another */
     const bool needless = begins || (x->unmeasured && is_guessed(x, r));
     uz_status status = isinf(x->base_aim) && !needless ? solve_base(x, BASE_ROUGH, err) : UZ_OK;

@@ -222,7 +222,9 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
                   .rate[EXCHANGE] = FAIR_RATE};
     int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
     bool over = false; /* no guess can be solved; too little time is found by whoever goes on */
+    load->begins = true;
     uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
+    load->begins = false;
     if (!p.active || !p.held || !p.refuted || !p.r || !p.g)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)m);
     if (status != UZ_OK)

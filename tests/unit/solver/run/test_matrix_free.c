@@ -127,6 +127,27 @@ TEST(conjugate_steps_keep_what_inner_iterations_leave_small)
         }
 }
 
+/* Where lambda_max is known of the body, a method that begins at no reactions asks for their gaps first: those of the
+ * body without its rows, which an active set by coarser grids does without. */
+TEST(iterations_on_a_body_that_is_known_begin_at_its_gaps)
+{
+    static const uz_method methods[] = {UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACCELERATED, UZ_METHOD_CONJUGATE};
+    uz_problem problem = scene_problem(30, 10);
+    uz_cache *cache = uz_cache_new((size_t)1 << 30);
+    for (int k = 0; k < 3; k++)
+        for (int again = 0; again < 2; again++) {
+            uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, methods[k], 1e-6);
+            uz_result *result = NULL;
+            uz_error err = {0};
+            CHECK_INT(uz_solve(&result, &problem, &s, cache, NULL, &err), UZ_OK);
+            CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+            CHECK_INT(result->summary.active, 22);
+            uz_result_free(result);
+        }
+    uz_cache_free(cache);
+    uz_problem_clear(&problem);
+}
+
 /* The least eigenvalue of the preconditioned matrix, with the obstacle's normal along (tilt, 1). */
 static double conditioning(double tilt)
 {
