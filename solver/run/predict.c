@@ -60,6 +60,17 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     return UZ_OK;
 }
 
+/* Of matrices that have to be assembled, or analysed: about so many bytes for each dof, and up to so many dofs, beyond
+ * which it takes minutes. */
+#define ASSEMBLY_BYTES 1000.0
+#define MOST_ASSEMBLED 4e6
+
+static bool may_be_assembled(double dofs, const uz_settings *settings)
+{
+    return dofs < MOST_ASSEMBLED &&
+           (settings->memory_limit == 0 || dofs * ASSEMBLY_BYTES < (double)settings->memory_limit);
+}
+
 /* *out: the case whose points couple most; its loads are none where no case has any. False: none may be compared. */
 static bool find_coupled(uz_scene *out, const uz_problem *problem, const uz_body_model *model)
 {
@@ -96,12 +107,14 @@ static uz_status predict_finite(uz_prediction *out, const uz_body_model *model, 
     uz_body_model large = *model;
     uz_prediction of_large = *out;
     uz_status status = UZ_OK;
-    if (model->brick || !find_coupled(&scene, problem, model))
+    if ((model->brick && !may_be_assembled((double)model->d, settings)) || !find_coupled(&scene, problem, model))
         return UZ_OK;
-    const bool couples = scene.n_loads > 0 && (!finite || problem->n_cases > 0); /* and the model does not yet */
+    /* and the model does not yet, or has no matrix */
+    const bool couples = model->brick || (scene.n_loads > 0 && (!finite || problem->n_cases > 0));
     scene.kinematics = UZ_KINEMATICS_FINITE;
     if (couples) {
         large.K = large.K_fixed = (uz_csc){0};
+        large.brick = NULL;
         status = uz_build_pattern(&large, &scene, err);
         if (status == UZ_OK)
             status = predict(&of_large, &large.K, N, &large, &scene, problem->n_cases, settings, hooks, err);
@@ -136,11 +149,6 @@ static uz_status find_rows(uz_csc *N, int64_t *all, const uz_body_model *model, 
     return status;
 }
 
-/* Of matrices that have to be assembled, or analysed: about so many bytes for each dof, and up to so many dofs, beyond
- * which it takes minutes. */
-#define ASSEMBLY_BYTES 1000.0
-#define MOST_ASSEMBLED 4e6
-
 static uz_status refuse_large(const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
     const uz_scene *scene = &problem->scene;
@@ -151,10 +159,9 @@ static uz_status refuse_large(const uz_problem *problem, const uz_settings *sett
             return UZ_OK;
         dofs = uz_scene_dim(scene) * (is_box ? uz_box_node_count(&scene->box) : (double)scene->given.n_nodes);
     }
-    if (dofs < MOST_ASSEMBLED &&
-        (settings->memory_limit == 0 || dofs * ASSEMBLY_BYTES < (double)settings->memory_limit))
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_LIMIT, "", "%.0f unknowns are too many for a prediction", dofs);
+    return may_be_assembled(dofs, settings)
+               ? UZ_OK
+               : uz_fail(err, UZ_ERR_LIMIT, "", "%.0f unknowns are too many for a prediction", dofs);
 }
 
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,

@@ -19,6 +19,12 @@
 /* Cubes of this many dofs are solved by their cells in the time that a factor of them takes, and larger ones in less.
  */
 #define MANY_DOFS 2e4
+/* The same of plane bodies, whose factors are cheaper, and where it pays even with what a factor spares later loads:
+ * for so many of them, of bodies that are no longer, and where the grids do as well as of other materials. */
+#define MANY_PLANE_DOFS 4e4
+#define FEW_LOADS       10
+#define LONG_PLANE      20.0
+#define SOFT_PLANE      0.45
 
 static bool is_along_axis(const double n[3])
 {
@@ -51,7 +57,11 @@ static bool are_worth_it(const uz_problem *problem)
     double dofs = box->dim;
     for (int c = 0; c < box->dim; c++)
         dofs *= (double)box->cells[c] + 1.0;
-    return box->dim == 3 && dofs >= MANY_DOFS;
+    if (box->dim == 3)
+        return dofs >= MANY_DOFS;
+    const double longer = fmax(box->size[0], box->size[1]), shorter = fmin(box->size[0], box->size[1]);
+    return dofs >= MANY_PLANE_DOFS && problem->n_cases <= FEW_LOADS && longer <= LONG_PLANE * shorter &&
+           (scene->model == UZ_PLANE_STRESS || scene->materials[0].poisson <= SOFT_PLANE);
 }
 
 uz_body_extent uz_setup_extent(const uz_problem *problem, const uz_settings *settings)

@@ -134,6 +134,7 @@ static void bench_body(report *out, int64_t nx, double relative_error)
     char name[64];
     body b;
     settings.relative_error = relative_error;
+    settings.op = UZ_OPERATOR_CONDENSED; /* by its cells the scene would have no factor */
     body_begin(&b, nx);
     matrices.qp = b.qp;
     bench_ordering ordering = bench_better_ordering(&b.qp.K, b.qp.p);
@@ -159,6 +160,7 @@ static void bench_accuracy(report *out, uz_method method, double relative_error,
     double samples[RUNS_MOST], iterations = 0.0;
     char name[64];
     settings.method = method;
+    settings.op = UZ_OPERATOR_CONDENSED;
     settings.relative_error = relative_error;
     settings.max_iterations = 1000000;
     for (int k = 0; k < 3; k++)

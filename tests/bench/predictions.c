@@ -22,7 +22,7 @@ typedef struct {
     const char *element;
     int64_t cells[3];
     double poisson, stretch, jump; /* stretch: of a cell along x over the others; jump: of E in a ball; 0: 1 */
-    bool moved;                    /* the mesh in numbers, inner nodes moved */
+    bool moved;                    /* the mesh in numbers, inner nodes moved; in the plane graded */
     uz_operator op;
 } predicted_row;
 
@@ -75,6 +75,9 @@ static const predicted_row ROWS[] = {
     {"quad4", {300, 100, 0}, 0.3, 0, 0, false, 0},
     {"quad4", {600, 200, 0}, 0.3, 0, 0, false, 0},
     {"quad4", {900, 300, 0}, 0.3, 0, 0, false, 0},
+    {"quad4", {300, 100, 0}, 0.3, 0, 0, false, DENSE},
+    {"quad4", {600, 200, 0}, 0.3, 0, 0, false, DENSE},
+    {"quad4", {900, 300, 0}, 0.3, 0, 0, false, DENSE},
     {"quad8", {300, 100, 0}, 0.3, 0, 0, false, 0},
     {"tri3", {300, 100, 0}, 0.3, 0, 0, false, 0},
     /* by the other form */
@@ -99,9 +102,9 @@ static const predicted_row ROWS[] = {
     {"tet10", {12, 12, 12}, 0.49, 0, 0, false, FREE},
     {"hex20", {12, 12, 12}, 0.3, 0, 0, false, FREE},
     {"wedge6", {24, 24, 24}, 0.3, 0, 0, false, FREE},
-    {"quad4", {300, 100, 0}, 0.3, 0, 0, false, FREE},
-    {"quad4", {600, 200, 0}, 0.3, 0, 0, false, FREE},
-    {"quad4", {900, 300, 0}, 0.3, 0, 0, false, FREE},
+    {"quad4", {300, 100, 0}, 0.3, 0, 0, true, FREE},
+    {"quad4", {600, 200, 0}, 0.3, 0, 0, true, FREE},
+    {"quad4", {900, 300, 0}, 0.3, 0, 0, true, FREE},
     {"quad8", {300, 100, 0}, 0.3, 0, 0, false, FREE},
 };
 enum { COUNT = sizeof ROWS / sizeof ROWS[0] };
@@ -199,8 +202,10 @@ static uz_scene scene_of(const predicted_row *row)
     snprintf(s.box.element, sizeof s.box.element, "%s", row->element);
     memcpy(s.box.cells, row->cells, sizeof s.box.cells);
     s.materials[0].poisson = row->poisson;
-    if (row->cells[2] == 0)
+    if (row->cells[2] == 0) { /* cells that are not all equal have a matrix */
+        s.box.grading[0] = row->moved ? 1.01 : 1.0;
         return s;
+    }
     s.model = UZ_SOLID;
     s.box.dim = 3;
     s.materials[0].young = YOUNG;

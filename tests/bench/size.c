@@ -32,6 +32,7 @@ static void solve_once(void *ctx)
     uz_result *result = NULL;
     uz_error err = {0};
     settings.relative_error = 1e-8;
+    settings.op = UZ_OPERATOR_CONDENSED; /* by its cells the scene would have no factor */
     if (uz_solve(&result, task->problem, &settings, task->cache, NULL, &err) != UZ_OK ||
         result->summary.outcome != UZ_CONVERGED) {
         printf("a bench problem did not converge: %s\n", result ? result->summary.message : err.message);

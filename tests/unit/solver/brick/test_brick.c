@@ -558,6 +558,51 @@ TEST(auto_takes_boxes_of_many_cells_and_tells_their_memory)
     uz_scene_clear(&scene);
 }
 
+static uz_operator chosen_for(const uz_scene *scene, int64_t cases, const uz_settings *settings)
+{
+    uz_load_case none[16] = {{.name = ""}};
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = *scene, .cases = none, .n_cases = cases};
+    uz_prediction predicted;
+    uz_error err = {0};
+    CHECK_MSG(uz_predict(&predicted, &problem, settings, NULL, &err) == UZ_OK, "%s", err.message);
+    return predicted.op;
+}
+
+/* A plane body is solved by its cells where that is cheaper even with what a factor spares later loads; what it takes,
+ * and the answer of a factor. */
+TEST(auto_takes_plane_bodies_of_many_cells)
+{
+    uz_scene scene = block_scene(270, 90, 0, 0.3);
+    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+    uz_settings settings = uz_settings_default(), direct = settings;
+    settings.relative_error = direct.relative_error = 1e-6;
+    direct.op = UZ_OPERATOR_CONDENSED;
+    uz_result *result = solve_problem(&problem, &settings), *want = solve_problem(&problem, &direct);
+    const uz_cost *cost = &result->summary.cost;
+    CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+    CHECK_INT(result->summary.op, UZ_OPERATOR_MATRIX_FREE);
+    CHECK_MSG(fabs(cost->bytes / cost->actual_bytes - 1) < 0.2, "%g bytes of %g", cost->bytes, cost->actual_bytes);
+    CHECK_INT(result->summary.active, want->summary.active);
+    CHECK_REL(result->summary.reaction_sum, want->summary.reaction_sum, 1e-6);
+    CHECK(4 * cost->actual_bytes < want->summary.cost.actual_bytes);
+    uz_result_free(result);
+    uz_result_free(want);
+    CHECK_INT(chosen_for(&scene, 10, &settings), UZ_OPERATOR_MATRIX_FREE);
+    CHECK_INT(chosen_for(&scene, 11, &settings), UZ_OPERATOR_CONDENSED);
+    scene.box.size[0] = 401; /* twenty times as long as high */
+    CHECK_INT(chosen_for(&scene, 0, &settings), UZ_OPERATOR_CONDENSED);
+    scene.box.size[0] = 60;
+    scene.materials[0].poisson = 0.46;
+    CHECK_INT(chosen_for(&scene, 0, &settings), UZ_OPERATOR_MATRIX_FREE);
+    scene.model = UZ_PLANE_STRAIN;
+    CHECK_INT(chosen_for(&scene, 0, &settings), UZ_OPERATOR_CONDENSED);
+    scene.materials[0].poisson = 0.3;
+    CHECK_INT(chosen_for(&scene, 0, &settings), UZ_OPERATOR_MATRIX_FREE);
+    scene.box.cells[1] = 60; /* 33,062 dofs */
+    CHECK_INT(chosen_for(&scene, 0, &settings), UZ_OPERATOR_CONDENSED);
+    uz_scene_clear(&scene);
+}
+
 /* Boxes by their cells up to the largest scenes; what has to be assembled up to where that takes minutes, or more than
  * the limit. */
 TEST(what_is_predicted_of_large_boxes)
