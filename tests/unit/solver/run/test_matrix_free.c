@@ -543,10 +543,13 @@ TEST(a_factor_that_costs_twice_a_multigrid_is_not_made)
 TEST(threads_divide_what_they_share)
 {
     for (int threads = 1; threads <= 4; threads++) {
-        const double box = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, true, threads),
-                     mesh = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, false, threads);
-        CHECK(threads == 1 ? box == 2 && mesh == 2 : 2.0 / threads < box && box < mesh && mesh < 2);
-        CHECK(uz_cost_shared(2, UZ_OPERATOR_CONDENSED, false, threads) == 2);
+        const uz_brick solid = {.axes = 3}, flat = {.axes = 2};
+        const double box = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, &solid, threads),
+                     plane = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, &flat, threads),
+                     mesh = uz_cost_shared(2, UZ_OPERATOR_MATRIX_FREE, NULL, threads);
+        CHECK(threads == 1 ? box == 2 && plane == 2 && mesh == 2
+                           : 2.0 / threads < box && box < plane && plane < mesh && mesh < 2);
+        CHECK(uz_cost_shared(2, UZ_OPERATOR_CONDENSED, NULL, threads) == 2);
     }
 }
 
