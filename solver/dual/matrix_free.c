@@ -37,7 +37,7 @@
  * stays as rough as that. So it is before anybody has said what it is for. */
 #define BASE_ROUGH 1e-3
 /* The same where few of the dofs have bounds: the first guess of the rows is worse than this anyway. */
-#define BASE_ROUGHER 3e-2
+#define BASE_ROUGHER 0.1
 #define FIRST_AIM    1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
@@ -63,6 +63,8 @@ typedef struct {
     double base_slack; /* of base = K^-1 p, */
     double base_aim;   /* and what it was solved for; INFINITY: not at all, it is 0 */
     double held_slack; /* of known_u, while it is there */
+    double wanted;     /* what that was to be, had the body no other way to move than those that are left to it */
+    double share;      /* of tolerances that are as good as exact: of a guess whose slack was far more than that */
     bool unmeasured;   /* and while nobody has asked for it: its guess was seen to be wrong on the way, or pulls */
     bool cut;          /* known_r is without what pulled: known_u is the answer for it, but not to begin at */
     int refused;       /* guesses that were left to steps of the active set */
@@ -135,6 +137,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->aim = FIRST_AIM;
     x->stop.deadline = INFINITY;
     x->tight = CHANGE_KEPT;
+    x->share = 1.0;
     x->base_aim = INFINITY;
     x->sparse.p = uz_alloc(d, sizeof *x->sparse.p);
     x->right = uz_alloc(d, sizeof *x->right);
@@ -501,11 +504,24 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* Nor better, where few dofs have bounds, than to this share of what the guess changes: the next one would change more
  * than that. Plane bodies take more guesses above this share, solids none of 0.2. */
 #define GUESS_KEPT 0.05
+/* The same where solves are in single precision, and begin again for what is left: a guess that is seen to be wrong
+ * half solved makes the next one worse, and another costs more than the step that this takes. Cubes of 64 cells a side
+ * of hex8 and tet4 take 4 and 6 guesses, at ten times as much 7 and 9. */
+#define GUESS_LEFT 0.01
+/* A body that overlaps a smooth obstacle touches it where it does so by half of the most, if it is as soft everywhere:
+ * of spheres exactly (Hertz). From there on guesses grow or shrink a little, where from all that overlaps they shrink
+ * step by step. */
+#define DEEP 0.5
 /* Of the aim: below this a solve is as good as exact; where M is not to be trusted, so that lambda is a guess and each
  * certificate takes as many steps as five digits do. The aim is relative to u'K u, which exceeds the energy of what
  * supports move (by 70 times, a ring that is pressed together), and the certificate to that. */
 #define ACTIVE_FLOOR  0.5
 #define GUESSED_FLOOR 0.02
+
+/* What is left of a body that is held is bounded by how far it moves the body that is not, which gives way the more,
+ * the more slender it is: beyond so many times what it was to be it is solved for again, to half of that. Of cubes it
+ * is twice as much, of bars ten times as long as thick 5 to 19 times. */
+#define SPREAD 8.0
 
 /* A guess of the rows on its way to its answer. */
 typedef struct {
@@ -585,10 +601,11 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     uz_dual_load *load = &x->sparse.load;
     const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
-    const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim,
+    const double least = (load->dual->amg->info.least > 0.0 ? GUESSED_FLOOR : ACTIVE_FLOOR) * x->aim * x->share,
                  root = sqrt(load->dual->amg->info.lambda);
     stepwise on_way = {x, g, active, least};
-    const bool at_once = cg->mg->kind->solve && x->coarse < AT_ONCE * least;
+    const uz_multigrid_kind *kind = cg->mg->kind;
+    const bool at_once = kind->solve && x->coarse < AT_ONCE * least, few = uz_bounds_are_few(m, d);
     double tolerance = at_once ? least : fmax(least, x->coarse);
     bool ended = false;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
@@ -600,9 +617,9 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         uz_cg_stop stop = stop_at(x, goal > 0.0 ? 0.0 : tolerance * root, goal);
         uz_cg_info info;
         stop.unchecked = tolerance >= NO_DRIFT;
-        if (tolerance > least && uz_bounds_are_few(m, d))
-            stop.relative = fmax(stop.relative, GUESS_KEPT);
-        if (tolerance > least && !cg->mg->kind->solve && !cg->mg->kind->solve_roughly) {
+        if (tolerance > least && few)
+            stop.relative = fmax(stop.relative, kind->solve_roughly ? GUESS_LEFT : GUESS_KEPT);
+        if (tolerance > least && !kind->solve && !kind->solve_roughly) {
             stop.look = look;
             stop.ctx = &on_way;
             stop.look_absolute = stop.absolute;
@@ -612,6 +629,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
             stop.unchecked = least >= NO_DRIFT;
         }
         stop.begun = true;
+        x->wanted = goal / root;
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
@@ -762,7 +780,14 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
     }
-    const uz_status status = solve_stepwise(x, r, g, active, err);
+    uz_status status = solve_stepwise(x, r, g, active, err);
+    const uz_multigrid *mg = x->cg.mg;
+    const bool measured = status == UZ_OK && !x->unmeasured && isfinite(x->held_slack);
+    if (measured && mg->kind->solve_roughly && x->wanted > 0.0 && x->held_slack > SPREAD * x->wanted) {
+        x->share *= 0.5 * SPREAD * x->wanted / x->held_slack;
+        x->coarse = DBL_MIN;
+        status = solve_stepwise(x, r, g, active, err);
+    }
     x->sparse.known_u = status == UZ_OK ? box->u : NULL;
     x->sparse.known_r = status == UZ_OK ? box->r : NULL;
     *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
@@ -819,16 +844,33 @@ static void start_near(free_load *x, bool *active)
     }
 }
 
+/* The first guess: rows that the body overlaps deeply by itself. */
+static void start_deep(const free_load *x, bool *active)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    const double *scale = x->sparse.box->bounds->scale;
+    double deepest = 0.0;
+    for (int64_t i = 0; i < load->dual->m; i++)
+        deepest = fmin(deepest, load->g0[i] / fabs(scale[i]));
+    for (int64_t i = 0; i < load->dual->m; i++)
+        active[i] = uz_gap_penetrates(load->g0[i]) && load->g0[i] / fabs(scale[i]) <= DEEP * deepest;
+}
+
 static bool guess_active(uz_dual_load *load, bool *active)
 {
     free_load *x = (free_load *)load;
+    const bool few = x->sparse.box && uz_bounds_are_few(load->dual->m, load->dual->d), first = x->coarse <= 0.0;
     if (x->near && !x->sparse.box->contradictory) {
         start_near(x, active);
         return true;
     }
     if (x->cg.mg->kind->start)
         return start_on_grids(x, active);
-    if (x->sparse.box && uz_bounds_are_few(load->dual->m, load->dual->d) && x->refused++ < REFUSED_MOST)
+    if (few && first && isfinite(x->base_aim)) {
+        start_deep(x, active);
+        return true;
+    }
+    if (few && x->refused++ < REFUSED_MOST)
         return false;
     return uz_sparse_guess_active(load, active);
 }
