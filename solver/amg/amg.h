@@ -80,6 +80,11 @@ typedef struct {
      * precision that the cycle is made of, which is K but for `rough`. NULL: there is none. */
     uz_status (*step_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
                               void *ctx, uz_error *err);
+    /* The same of two residuals r (2 x n), each with a visitor's context of its own, until both are ended, of K in
+     * double precision: a third more than steps of one. More levels than one; the room can only be freed then. NULL:
+     * there is none. */
+    uz_status (*step_both)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                           void *const ctx[2], uz_error *err);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
     uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);
     void (*free_room)(uz_multigrid_room *room); /* NULL and half-built ones too */
@@ -179,6 +184,9 @@ typedef struct uz_cg_info {
 bool uz_cg_should_stop(const uz_cg_info *info, const uz_cg_stop *stop);
 /* The next direction: cg->p = cg->z + beta cg->p, by the threads there are. */
 void uz_cg_turn(uz_cg *cg, double beta);
+
+/* NOT_SPD: some p'K p was not positive. */
+uz_status uz_cg_fail_direction(uz_error *err);
 
 /* x (n): in, a start; out, nearer to K^-1 b. At held dofs it stays as it is, and K x has its part. The residual of the
  * x that is returned stands in cg->r. UZ_ERR_NOT_SPD: some p'K p was not positive. */

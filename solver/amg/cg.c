@@ -32,6 +32,13 @@ uz_status uz_cg_hold(uz_cg *cg, const uz_csc *K, const bool *held, const uz_stop
     return cg->mg->kind->hold(cg->mg, K, cg->room, held, &cg->grown, stop, err);
 }
 
+uz_status uz_cg_fail_direction(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                   "K is not positive definite: conjugate gradients met a direction that it does not resist. Support "
+                   "the body so that it can't move freely, or check the signs of K.");
+}
+
 void uz_cg_clear(uz_cg *cg)
 {
     if (cg->mg)
@@ -220,9 +227,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
             if (fabs(curvature) < DBL_MIN) /* underflow: there is no more to gain */
                 break;
             if (!(curvature > 0.0))
-                return uz_fail(err, UZ_ERR_NOT_SPD, "K",
-                               "K is not positive definite: conjugate gradients met a direction that it does not "
-                               "resist. Support the body so that it can't move freely, or check the signs of K.");
+                return uz_cg_fail_direction(err);
             u.factor = alpha;
             uz_by_pieces(take_step, &u, n);
             status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);

@@ -182,6 +182,10 @@ uz_status uz_solve_roughly(const uz_multigrid *mg, uz_multigrid_room *room, uz_c
 uz_status uz_step_roughly(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
                           void *ctx, uz_error *err);
 
+/* kind->step_both. */
+uz_status uz_step_both(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+                       void *const ctx[2], uz_error *err);
+
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
 uz_status uz_cycle_below(const uz_aggregates *mg, uz_multigrid_room *room, int from, int lanes, uz_error *err);
 /* The room is for cycles of two lanes, too, from now on. More levels than one. False: no memory. */

@@ -871,7 +871,7 @@ TEST(patience_ends)
         CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 0, PATIENCE, NULL, &err), flat ? UZ_ERR_LIMIT : UZ_OK);
         if (flat) {
             const char *after = strstr(err.message, "as ");
-            CHECK(amg == NULL && after && atoi(after + 3) > PATIENCE / 4 && atoi(after + 3) < PATIENCE / 2);
+            CHECK(amg == NULL && after && atoi(after + 3) > PATIENCE / 6 && atoi(after + 3) < PATIENCE / 2);
         } else {
             CHECK(amg->info.iterations < PATIENCE);
         }
