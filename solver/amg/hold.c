@@ -29,10 +29,22 @@ static uz_status fail_memory(int64_t n, uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to hold dofs of %lld", (long long)n);
 }
 
-/* to += G + G', G one block at (a, c), k x k. */
-static inline __attribute__((always_inline)) void add_symmetric(uz_blocks *to, int32_t a, int32_t c, const double *G,
-                                                                int k)
+static void clear_row(uz_blocks *to, int64_t row)
 {
+    const int64_t size = (int64_t)to->b * to->b, first = to->ptr[row];
+    memset(to->off + first * size, 0, (size_t)((to->ptr[row + 1] - first) * size) * sizeof *to->off);
+    memset(to->diag + row * size, 0, (size_t)size * sizeof *to->diag);
+}
+
+/* to += G + G', G one block at (a, c), k x k. touched: which rows of `to` have numbers yet; NULL: all. */
+static inline __attribute__((always_inline)) void add_symmetric(uz_blocks *to, bool *touched, int32_t a, int32_t c,
+                                                                const double *G, int k)
+{
+    const int32_t row = a > c ? a : c;
+    if (touched && !touched[row]) {
+        clear_row(to, row);
+        touched[row] = true;
+    }
     double *block =
         a == c ? to->diag + (int64_t)a * k * k : to->off + uz_blocks_find(to, a > c ? a : c, a > c ? c : a) * k * k;
     for (int p = 0; p < k; p++)
@@ -51,6 +63,7 @@ typedef struct {
     int64_t i, j;               /* its nodes */
     const double *left, *right; /* b: weights of its rows and columns */
     int32_t first, end;         /* of the coarse matrix it is added to these rows alone: below its diagonal */
+    bool *touched;              /* see add_symmetric */
 } coupling;
 
 /* Are there rows to add to where these columns, ascending, meet one another? */
@@ -90,7 +103,7 @@ static inline __attribute__((always_inline)) void add_blocks(uz_blocks *to, cons
                 for (int p = 0; p < k; p++)
                     for (int c = 0; c < k; c++)
                         G[p * k + c] += (double)of_row[row[q] * k + p] * AP[q * k + c];
-            add_symmetric(to, fine->block[f], column, G, k);
+            add_symmetric(to, x->touched, fine->block[f], column, G, k);
         }
     }
 }
@@ -132,6 +145,7 @@ typedef struct {
     const float *inverse;
     const uz_blocks *from; /* loss of the finer level that it is P'(that) P of; NULL: it comes of held dofs */
     bool *any;             /* nodes: has it held dofs, or lost something itself? */
+    bool *touched;         /* of `loss`: which rows have numbers; NULL: all */
     int32_t first[UZ_ASIDE_MOST + 1];
 } losing;
 
@@ -147,9 +161,9 @@ static void lose_part(void *ctx, int part)
         const bool own = x->any[i];
         weigh(held_i, rest_i, x->inverse + i * b, b);
         if (own)
-            add_coupling(
-                x->loss, fine,
-                &(coupling){uz_level_block(room, fine, true, i, b * b), false, i, i, held_i, rest_i, first, end});
+            add_coupling(x->loss, fine,
+                         &(coupling){uz_level_block(room, fine, true, i, b * b), false, i, i, held_i, rest_i, first,
+                                     end, x->touched});
         for (int64_t e = A->ptr[i]; e < A->ptr[i + 1]; e++) {
             const int64_t j = A->idx[e];
             const bool other = x->any[j];
@@ -158,9 +172,9 @@ static void lose_part(void *ctx, int part)
             const double *block = uz_level_block(room, fine, false, e, b * b);
             weigh(held_j, rest_j, x->inverse + j * b, b);
             if (own)
-                add_coupling(x->loss, fine, &(coupling){block, false, i, j, held_i, rest_j, first, end});
+                add_coupling(x->loss, fine, &(coupling){block, false, i, j, held_i, rest_j, first, end, x->touched});
             if (other)
-                add_coupling(x->loss, fine, &(coupling){block, true, j, i, held_j, rest_i, first, end});
+                add_coupling(x->loss, fine, &(coupling){block, true, j, i, held_j, rest_i, first, end, x->touched});
         }
     }
 }
@@ -208,15 +222,21 @@ static void look_for_held(void *ctx, int64_t begin, int64_t end)
         x->any[i] = is_any_held(x->inverse + i * b, x->fine->inverse + i * b, b);
 }
 
-bool uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+static bool lose_held(uz_blocks *loss, bool *touched, const uz_level *fine, const float *inverse)
 {
     const int64_t nodes = fine->A.nodes;
-    losing x = {.loss = loss, .fine = fine, .inverse = inverse, .any = uz_alloc(nodes, sizeof *x.any)};
+    losing x = {
+        .loss = loss, .fine = fine, .inverse = inverse, .any = uz_alloc(nodes, sizeof *x.any), .touched = touched};
     if (x.any)
         uz_by_pieces(look_for_held, &x, nodes);
     const bool ok = x.any && lose_by_parts(&x, lose_part);
     free(x.any);
     return ok;
+}
+
+bool uz_level_loss(uz_blocks *loss, const uz_level *fine, const float *inverse)
+{
+    return lose_held(loss, NULL, fine, inverse);
 }
 
 static bool is_zero(const double *block, int64_t size)
@@ -248,23 +268,33 @@ static void pass_part(void *ctx, int part)
         if (!x->any[i])
             continue;
         if (!is_zero(from->diag + i * size, size))
-            add_coupling(x->loss, x->fine, &(coupling){from->diag + i * size, false, i, i, all, half, first, end});
+            add_coupling(x->loss, x->fine,
+                         &(coupling){from->diag + i * size, false, i, i, all, half, first, end, x->touched});
         for (int64_t e = from->ptr[i]; e < from->ptr[i + 1]; e++)
             if (!is_zero(from->off + e * size, size))
-                add_coupling(x->loss, x->fine,
-                             &(coupling){from->off + e * size, false, i, from->idx[e], all, all, first, end});
+                add_coupling(
+                    x->loss, x->fine,
+                    &(coupling){from->off + e * size, false, i, from->idx[e], all, all, first, end, x->touched});
     }
 }
 
-/* What the next level loses: P'(loss) P. false: no memory. */
-static bool pass_on(uz_blocks *next, const uz_blocks *loss, const uz_level *level, const uz_team *team)
+/* What the next level loses: P'(loss) P. lost: rows of `loss` that have numbers; NULL: all; touched: likewise of next.
+ * false: no memory. */
+static bool pass_on(uz_blocks *next, bool *touched, const uz_blocks *loss, const bool *lost, const uz_level *level,
+                    const uz_team *team)
 {
     const int64_t begin = uz_team_first(team, 0, loss->nodes), end = uz_team_first(team, 1, loss->nodes);
     const int parts = end - begin < 2 * PART_LEAST ? 1 : uz_aside_threads();
-    losing x = {.loss = next, .fine = level, .from = loss, .any = uz_alloc_zero(loss->nodes, sizeof *x.any)};
+    losing x = {.loss = next,
+                .fine = level,
+                .from = loss,
+                .any = uz_alloc_zero(loss->nodes, sizeof *x.any),
+                .touched = touched};
     for (int part = 0; part <= parts; part++)
         x.first[part] = (int32_t)(begin + (end - begin) * part / parts);
-    if (x.any)
+    if (x.any && lost)
+        memcpy(x.any + begin, lost + begin, (size_t)(end - begin) * sizeof *x.any);
+    else if (x.any)
         uz_aside_share(look_for_losses, &x, parts);
     x.first[0] = 0; /* what is lost is shared out by all rows of the next level */
     const bool ok = x.any && lose_by_parts(&x, pass_part);
@@ -306,7 +336,7 @@ static bool subtract_off(uz_level *own, const uz_level *level, const uz_blocks *
     return true;
 }
 
-static bool subtract_diag(uz_level *own, const uz_level *level, const uz_blocks *loss)
+static bool subtract_diag(uz_level *own, const uz_level *level, const uz_blocks *loss, const bool *lost)
 {
     const int b = level->A.b;
     const int64_t size = (int64_t)b * b, n = level->A.nodes * b, diag = level->A.nodes * size;
@@ -314,7 +344,14 @@ static bool subtract_diag(uz_level *own, const uz_level *level, const uz_blocks 
     own->inverse = uz_alloc(n, sizeof *own->inverse);
     if (!own->diag || !own->inverse)
         return false;
-    uz_by_pieces(subtract_numbers, &(difference){own->diag, level->diag, loss->diag}, diag);
+    difference numbers = {own->diag, level->diag, loss->diag};
+    if (lost)
+        memcpy(own->diag, level->diag, (size_t)diag * sizeof *own->diag);
+    for (int64_t i = 0; lost && i < level->A.nodes; i++)
+        if (lost[i])
+            subtract_numbers(&numbers, i * size, (i + 1) * size);
+    if (!lost)
+        uz_by_pieces(subtract_numbers, &numbers, diag);
     memset(own->diag + diag, 0, 8 * sizeof *own->diag);
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = i / b * size + i % b * b + i % b;
@@ -324,17 +361,21 @@ static bool subtract_diag(uz_level *own, const uz_level *level, const uz_blocks 
 }
 
 /* The coarsest level's factor. Where rounding has made it indefinite that of the whole body does. */
-static uz_status factor(uz_multigrid_room *room, const uz_level *last, const uz_blocks *loss, const uz_hooks *hooks,
-                        uz_error *err)
+static uz_status factor(uz_multigrid_room *room, const uz_level *last, const uz_blocks *loss, const bool *lost,
+                        const uz_hooks *hooks, uz_error *err)
 {
     const int64_t size = (int64_t)loss->b * loss->b;
     uz_blocks A = *loss;
     uz_csc columns = {0};
     uz_error inner = {0};
-    for (int64_t e = 0; e < loss->ptr[loss->nodes] * size; e++)
-        A.off[e] = last->A.off[e] - loss->off[e];
-    for (int64_t e = 0; e < loss->nodes * size; e++)
-        A.diag[e] = last->A.diag[e] - loss->diag[e];
+    for (int64_t i = 0; i < A.nodes; i++) {
+        if (lost && !lost[i])
+            clear_row(&A, i);
+        for (int64_t e = A.ptr[i] * size; e < A.ptr[i + 1] * size; e++)
+            A.off[e] = last->A.off[e] - A.off[e];
+        for (int64_t e = i * size; e < (i + 1) * size; e++)
+            A.diag[e] = last->A.diag[e] - A.diag[e];
+    }
     uz_status status = uz_blocks_to_columns(&columns, &A, room->own[room->levels - 1].inverse, err);
     if (status == UZ_OK) {
         status = uz_factor_coarsest(&room->coarsest, &columns, 0, hooks, &inner);
@@ -352,7 +393,8 @@ static void clear_numbers(void *ctx, int64_t begin, int64_t end)
     memset((double *)ctx + begin, 0, (size_t)(end - begin) * sizeof(double));
 }
 
-static bool init_loss(uz_blocks *loss, const uz_level *level)
+/* Zeros; or *touched, which is to be freed, says that there are no numbers yet. */
+static bool init_loss(uz_blocks *loss, bool **touched, const uz_level *level)
 {
     const int64_t size = (int64_t)level->A.b * level->A.b;
     *loss = level->A; /* whose places it shares */
@@ -361,6 +403,8 @@ static bool init_loss(uz_blocks *loss, const uz_level *level)
     loss->diag = uz_alloc(diag, sizeof *loss->diag);
     if (!loss->off || !loss->diag)
         return false;
+    if (touched)
+        return (*touched = uz_alloc_zero(level->A.nodes, sizeof **touched)) != NULL;
     uz_by_pieces(clear_numbers, loss->off, off);
     uz_by_pieces(clear_numbers, loss->diag, diag);
     return true;
@@ -389,37 +433,41 @@ static uz_status lose(uz_multigrid_room *room, const uz_aggregates *mg, int from
                       uz_error *err)
 {
     uz_blocks loss = *first;
+    bool *made = NULL; /* of the loss: rows that have numbers; team sums need them all */
     uz_status status = UZ_OK;
     for (int l = from; status == UZ_OK && l < mg->base.levels; l++) {
         uz_blocks next = {0};
-        if (l > from && !init_loss(&next, &mg->level[l]))
+        bool *touched = NULL;
+        if (l > from && !init_loss(&next, team ? NULL : &touched, &mg->level[l]))
             status = fail_memory(mg->base.n, err);
         else if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
-        else if (l > from && !pass_on(&next, &loss, &mg->level[l - 1], team))
+        else if (l > from && !pass_on(&next, touched, &loss, lost, &mg->level[l - 1], team))
             status = fail_memory(mg->base.n, err);
         if (l > from) {
             if (loss.off != first->off) {
                 free(loss.off);
                 free(loss.diag);
             }
+            free(made);
             loss = next;
+            lost = made = touched;
         }
-        if (status == UZ_OK && !(l == from && apart) &&
-            !subtract_off(&room->own[l], &mg->level[l], &loss, l == from ? lost : NULL))
+        if (status == UZ_OK && !(l == from && apart) && !subtract_off(&room->own[l], &mg->level[l], &loss, lost))
             status = fail_memory(mg->base.n, err);
-        if (status == UZ_OK && !subtract_diag(&room->own[l], &mg->level[l], &loss))
+        if (status == UZ_OK && !subtract_diag(&room->own[l], &mg->level[l], &loss, lost))
             status = fail_memory(mg->base.n, err);
         *bytes += own_bytes(&mg->level[l]);
     }
     if (status == UZ_OK)
-        status = factor(room, &mg->level[mg->base.levels - 1], &loss, stop ? stop->hooks : NULL, err);
+        status = factor(room, &mg->level[mg->base.levels - 1], &loss, lost, stop ? stop->hooks : NULL, err);
     if (status == UZ_OK && room->coarsest)
         *bytes += uz_factor_describe(room->coarsest).bytes;
     if (loss.off != first->off) {
         free(loss.off);
         free(loss.diag);
     }
+    free(made);
     return status;
 }
 
@@ -450,6 +498,7 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
     const uz_level *finest = &mg->level[0];
     const int64_t slots = finest->A.nodes * finest->A.b;
     uz_blocks loss = {0};
+    bool *touched = NULL;
     float *inverse = room->own[0].inverse = uz_alloc(slots, sizeof *inverse);
     uz_status status = inverse ? UZ_OK : fail_memory(mg->base.n, err);
     if (inverse)
@@ -458,10 +507,11 @@ uz_status uz_hold_levels(uz_multigrid_room *room, const uz_aggregates *mg, const
         if (held[j])
             inverse[uz_slot_number(mg, mg->slot[j])] = 0.0F;
     *bytes += 4 * (size_t)slots;
-    if (status == UZ_OK && (!init_loss(&loss, &mg->level[1]) || !uz_level_loss(&loss, finest, inverse)))
+    if (status == UZ_OK && (!init_loss(&loss, &touched, &mg->level[1]) || !lose_held(&loss, touched, finest, inverse)))
         status = fail_memory(mg->base.n, err);
     if (status == UZ_OK)
-        status = lose(room, mg, 1, &loss, NULL, false, bytes, NULL, stop, err);
+        status = lose(room, mg, 1, &loss, touched, false, bytes, NULL, stop, err);
+    free(touched);
     free(loss.off);
     free(loss.diag);
     return status;
