@@ -80,10 +80,10 @@ typedef struct {
      * precision that the cycle is made of, which is K but for `rough`. NULL: there is none. */
     uz_status (*step_roughly)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
                               void *ctx, uz_error *err);
-    /* The same of two residuals r (2 x n), each with a visitor's context of its own, until both are ended, of K in
-     * double precision: a third more than steps of one. More levels than one; the room can only be freed then. NULL:
-     * there is none. */
-    uz_status (*step_both)(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+    /* The same of two residuals r at once, each with a visitor's context of its own, until both are ended, of K in
+     * double precision: a third more than steps of one. They are drawn by these seeds: x'r is normal, for any x, with
+     * a variance of x'M x or more. More levels than one; the room can only be freed then. NULL: there is none. */
+    uz_status (*step_both)(const uz_multigrid *mg, uz_multigrid_room *room, const uint64_t seed[2], uz_cg_visit visit,
                            void *const ctx[2], uz_error *err);
     /* What a thread needs to apply it, *bytes of it; NULL: no memory. */
     uz_multigrid_room *(*room)(const uz_multigrid *mg, size_t *bytes);

@@ -6,6 +6,7 @@
 #include "core/alloc.h"
 #include "core/aside.h"
 #include "core/error.h"
+#include "core/random.h"
 #include "linalg/pieces.h"
 
 #include <math.h>
@@ -24,6 +25,7 @@ typedef struct {
     double unit;              /* of the residual that a cycle reads, and of what it makes of it */
     double sum[PIECES][BOTH]; /* of products */
     const double *x, *y;      /* whose products; NULL: what the last cycle made in place of y */
+    uint64_t seed[BOTH];
 } both;
 
 typedef float four_floats __attribute__((vector_size(16), aligned(4), may_alias));
@@ -103,17 +105,38 @@ static uz_status precondition(double square[BOTH], both *v, uz_error *err)
     return status;
 }
 
-static void enter(both *v, const double *r)
+/* q = D^-1/2 s, s standard normal. */
+static void draw(void *ctx, int64_t begin, int64_t end)
 {
-    const uz_aggregates *mg = v->mg;
-    double largest = 0.0;
-    for (int l = 0; l < BOTH; l++)
-        for (int64_t j = 0; j < mg->base.n; j++) {
-            const double value = mg->scale[j] * r[l * mg->base.n + j];
-            v->r[4 * (BOTH * uz_slot_node(mg, mg->slot[j]) + l) + uz_slot_place(mg, mg->slot[j])] = value;
-            largest = fmax(largest, fabs(value));
+    const both *v = ctx;
+    const uz_level *level = &v->mg->level[0];
+    const int b = level->A.b;
+    for (int l = 0; l < BOTH; l++) {
+        uint64_t state = uz_random_after(v->seed[l], 2 * (uint64_t)(begin * b));
+        for (int64_t i = begin; i < end; i++)
+            for (int r = 0; r < b; r++)
+                v->q[4 * (BOTH * i + l) + r] = sqrt((double)level->inverse[i * b + r]) * uz_normal(&state);
+    }
+}
+
+/* r = (D + L) q, so that r r' is (D + L) D^-1 (D + L') on an average: M of the sweeps alone, which coarse corrections
+ * only lessen. */
+static void raise(void *ctx, int64_t begin, int64_t end)
+{
+    const both *v = ctx;
+    const uz_level *level = &v->mg->level[0];
+    const uz_blocks *A = &level->A;
+    const int b = A->b;
+    for (int64_t i = begin; i < end; i++)
+        for (int64_t e = A->ptr[i]; e <= A->ptr[i + 1]; e++) {
+            const bool own = e == A->ptr[i + 1];
+            const float *block = own ? level->diag + i * b * b : level->off + e * b * b;
+            const double *q = v->q + 4 * BOTH * (own ? i : A->idx[e]);
+            for (int l = 0; l < BOTH; l++)
+                for (int r = 0; r < b; r++)
+                    for (int c = 0; c < (own ? r + 1 : b); c++)
+                        v->r[4 * (BOTH * i + l) + r] += (double)block[r * b + c] * q[4 * l + c];
         }
-    v->unit = unit_of((double[]){largest * largest, 0.0});
 }
 
 static uz_status take_steps(both *v, uz_cg_visit visit, void *const ctx[BOTH], uz_error *err)
@@ -141,7 +164,7 @@ static uz_status take_steps(both *v, uz_cg_visit visit, void *const ctx[BOTH], u
     return status;
 }
 
-uz_status uz_step_both(const uz_multigrid *base, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+uz_status uz_step_both(const uz_multigrid *base, uz_multigrid_room *room, const uint64_t seed[2], uz_cg_visit visit,
                        void *const ctx[2], uz_error *err)
 {
     const uz_aggregates *mg = (const uz_aggregates *)base;
@@ -149,6 +172,8 @@ uz_status uz_step_both(const uz_multigrid *base, uz_multigrid_room *room, const 
     both v = {.mg = mg,
               .room = room,
               .nodes = nodes,
+              .seed = {seed[0], seed[1]},
+              .unit = 1.0, /* of the numbers that the scaled diagonal has */
               .r = uz_alloc_zero(n, sizeof *v.r),
               .p = uz_alloc_zero(n, sizeof *v.p),
               .q = uz_alloc_zero(n, sizeof *v.q)};
@@ -157,7 +182,8 @@ uz_status uz_step_both(const uz_multigrid *base, uz_multigrid_room *room, const 
             ? UZ_OK
             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the spectrum of %lld dofs", (long long)base->n);
     if (status == UZ_OK) {
-        enter(&v, r);
+        uz_by_pieces(draw, &v, nodes);
+        uz_by_pieces(raise, &v, nodes);
         status = take_steps(&v, visit, ctx, err);
     }
     uz_free_all(v.r, v.p, v.q);

@@ -183,7 +183,7 @@ uz_status uz_step_roughly(const uz_multigrid *mg, uz_multigrid_room *room, const
                           void *ctx, uz_error *err);
 
 /* kind->step_both. */
-uz_status uz_step_both(const uz_multigrid *mg, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
+uz_status uz_step_both(const uz_multigrid *mg, uz_multigrid_room *room, const uint64_t seed[2], uz_cg_visit visit,
                        void *const ctx[2], uz_error *err);
 
 /* A V-cycle from level `from` down, more levels than one: room->x[from] = M^-1 room->b[from]. */
