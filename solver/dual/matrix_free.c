@@ -519,9 +519,11 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 #define GUESSED_FLOOR 0.02
 
 /* What is left of a body that is held is bounded by how far it moves the body that is not, which gives way the more,
- * the more slender it is: beyond so many times what it was to be it is solved for again, to half of that. Of cubes it
- * is twice as much, of bars ten times as long as thick 5 to 19 times. */
-#define SPREAD 8.0
+ * the more slender it is: beyond so many times what it was to be it is solved for again, to half of that, or to this
+ * share of it, as certificates of such bodies have a sharper bound. Of cubes it is twice as much, of bars ten times as
+ * long as thick 5 to 19 times. */
+#define SPREAD        8.0
+#define SHARE_AT_ONCE 0.2
 
 /* A guess of the rows on its way to its answer. */
 typedef struct {
@@ -766,6 +768,20 @@ static uz_status solve_active_rows(free_load *x, uz_active_end *end, double *r, 
     return UZ_OK;
 }
 
+/* Has a guess that is right left so much more than was wanted that it is to be solved for again? x->share is what that
+ * takes, which is never less than rounding leaves: a body that hardly anything holds has no slack as small as that. */
+static bool may_spread(free_load *x, const double *g, const bool *active)
+{
+    const double most = SPREAD * x->wanted, part = fmax(SHARE_AT_ONCE, 0.5 * most / x->held_slack),
+                 share = fmax(x->share * part, DBL_EPSILON / x->aim);
+    bool right = x->cg.mg->kind->solve_roughly && !x->unmeasured && isfinite(x->held_slack) && x->wanted > 0.0 &&
+                 x->held_slack > most && share < x->share;
+    for (int64_t i = 0; right && i < x->sparse.load.dual->m; i++)
+        right = active[i] || !uz_gap_penetrates(g[i]);
+    x->share = right ? share : x->share;
+    return right;
+}
+
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
 {
     free_load *x = (free_load *)load;
@@ -781,10 +797,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
         return UZ_OK;
     }
     uz_status status = solve_stepwise(x, r, g, active, err);
-    const uz_multigrid *mg = x->cg.mg;
-    const bool measured = status == UZ_OK && !x->unmeasured && isfinite(x->held_slack);
-    if (measured && mg->kind->solve_roughly && x->wanted > 0.0 && x->held_slack > SPREAD * x->wanted) {
-        x->share *= 0.5 * SPREAD * x->wanted / x->held_slack;
+    if (status == UZ_OK && may_spread(x, g, active)) {
         x->coarse = DBL_MIN;
         status = solve_stepwise(x, r, g, active, err);
     }

@@ -714,3 +714,28 @@ TEST(long_bodies_on_a_plane_are_as_good_as_asked)
         uz_problem_clear(&problem);
     }
 }
+
+/* A bar that little but a weak spring holds, on a plane: what is left of it as it is held counts for more than was
+ * wanted of the body that is not, so that its guess is solved for again; a guess that is wrong is not, nor does one
+ * make more of the digits that another was solved to. */
+TEST(guesses_of_weakly_held_bodies_are_solved_as_far_as_it_takes)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE,
+                          .scene = body_scene(UZ_SOLID, "tet4", (double[3]){10, 1, 1}, (int64_t[3]){60, 6, 6})};
+    uz_scene *s = &problem.scene;
+    s->kinematics = UZ_KINEMATICS_FIXED;
+    s->materials[0].young = 1;
+    body_spring(s, "top", 1e-6, 1e-6, 1e-6);
+    body_load(s, UZ_LOAD_TRACTION, "top", 0, -1e-3, 0);
+    body_plane(s, "bottom", (double[3]){0, -1e-3, 0}, (double[3]){0, 1, 0});
+    uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    uz_result *got = solve_problem(&problem, &freely);
+    if (got) {
+        const double error = got->summary.certificate.relative_error;
+        CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+        CHECK_INT(got->summary.method, UZ_METHOD_ACTIVE_SET);
+        CHECK_MSG(error <= 1e-6 && error > 1e-9, "%g", error);
+    }
+    uz_result_free(got);
+    uz_problem_clear(&problem);
+}
