@@ -167,6 +167,9 @@ typedef enum {
  * Errors: UZ_ERR_SCENE, _FREE_BODY, _NOT_FINITE, _MEMORY. */
 uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_body_extent extent, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
+/* For a body whose K is singular: UZ_ERR_FREE_BODY where a piece of it shares so few nodes with the rest, one or those
+ * of a line, that it can move, with the nodes, the piece's groups and its motions. Others: UZ_OK, UZ_ERR_MEMORY. */
+uz_status uz_check_hinges(const uz_body_model *model, uz_error *err);
 /* K and K_fixed of a brick after all. */
 uz_status uz_body_model_assemble(uz_body_model *model, uz_error *err);
 /* The same body with its contacts found where it has been displaced by scene->place: gaps, normals and what faces what

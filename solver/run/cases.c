@@ -35,6 +35,22 @@ static void name_case(uz_error *err, const uz_problem *problem, int64_t i)
         uz_error_name_case(err, problem, i);
 }
 
+/* A scene's K is singular: be it for a piece of the body that hangs on a node of the rest, which is told in its place.
+ */
+static void name_hinge(uz_status *status, const uz_scene *scene, uz_error *err)
+{
+    uz_body_model outline;
+    uz_error own = {0};
+    if (uz_body_model_build(&outline, scene, UZ_BODY_OUTLINE, NULL) != UZ_OK)
+        return;
+    if (uz_check_hinges(&outline, &own) == UZ_ERR_FREE_BODY) {
+        *status = UZ_ERR_FREE_BODY;
+        if (err)
+            *err = own;
+    }
+    uz_body_model_clear(&outline);
+}
+
 uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_problem *problem, const uz_settings *settings,
                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, double started,
                           uz_error *err)
@@ -79,5 +95,7 @@ uz_status uz_settle_cases(uz_result **results, uz_status rounds, const uz_proble
         uz_judge_whole_error(results[i], &one, settings, cache, hooks, started);
         uz_judge_quantity(results[i]);
     }
+    if (status == UZ_ERR_NOT_SPD && problem->kind == UZ_PROBLEM_SCENE)
+        name_hinge(&status, &problem->scene, err);
     return status;
 }

@@ -357,6 +357,42 @@ def test_unsupported_body(s):
     check(job["status"] == "successful", job)
 
 
+def test_a_piece_that_hangs_on_a_node(s):
+    """Two squares with one corner in common, two cubes with one and with an edge: the node is named, and what it leaves free."""
+    square = {"kind": "scene", "model": "plane_strain", "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+              "mesh": {"nodes": [[0, 0], [1, 0], [1, 1], [0, 1], [2, 1], [2, 2], [1, 2]], "elements": {"quad4": [[0, 1, 2, 3], [2, 4, 5, 6]]},
+                       "groups": {"base": {"edges": [[0, 1]]}, "up": {"edges": [[5, 6]]}, "piece": {"elements": [1]}}},
+              "supports": [{"on": "base", "ux": 0, "uy": 0}], "loads": [{"on": "up", "pressure": 1}],
+              "contacts": [{"on": "up", "obstacle": {"plane": {"point": [0, 3], "normal": [0, -1]}}}]}
+    for operator in "auto", "matrix_free":
+        fails(s, {"problem": square, "solver": {"operator": operator}}, "free_body", "/problem/mesh",
+              says=("node 2 at (1, 1) alone", "up, piece", "rotation about (1, 1)", "all nodes of a side"))
+    held = {**square, "supports": [*square["supports"], {"on": "up", "ux": 0}]}
+    check(solved(s, {"problem": held})[0]["outcome"] == "converged")
+    # of four elements each
+    cells = [(i + k, j + k) for k in (0, 2) for j in (0, 1) for i in (0, 1)]
+    around = [[(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in cells]
+    places = sorted({place for corners in around for place in corners})
+    quads = [[places.index(place) for place in corners] for corners in around]
+    larger = {**square, "mesh": {"nodes": places, "elements": {"quad4": quads},
+                                 "groups": {"base": {"edges": [quads[0][:2]]}, "up": {"edges": [quads[7][2:]]}, "piece": {"elements": [4, 5, 6, 7]}}}}
+    joint = f"node {places.index((2, 2))} at (2, 2) alone"
+    fails(s, {"problem": larger}, "free_body", "/problem/mesh", says=(joint, "up, piece)", "rotation about (2, 2)"))
+    corners = [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    for at, says in (([1, 1, 1], ("node 6 at (1, 1, 1) alone", "every rotation about it")),
+                     ([1, 0, 1], ("node 5 at (1, 0, 1), node 6 at (1, 1, 1) alone", "rotation about the axis through (1, 0.5, 1) along y"))):
+        nodes, second = list(corners), []
+        for corner in corners:
+            place = [a + b for a, b in zip(corner, at)]
+            if place not in nodes:
+                nodes.append(place)
+            second.append(nodes.index(place))
+        cubes = {**square, "model": "solid", "contacts": [], "supports": [{"on": "base", "ux": 0, "uy": 0, "uz": 0}],
+                 "mesh": {"nodes": nodes, "elements": {"hex8": [list(range(8)), second]},
+                          "groups": {"base": {"faces": [[0, 1, 2, 3]]}, "up": {"faces": [second[4:]]}}}}
+        fails(s, {"problem": cubes}, "free_body", "/problem/mesh", says=says)
+
+
 # ---------------------------------------------------------------- texts
 
 def test_truncated_matrix_market(s):
