@@ -27,7 +27,7 @@ export function show_whole_error(element, summary) {
   const ladder = summary.mesh?.ladder?.filter((one) => Number.isFinite(one.error)) || [];
   if (!ladder.length) return null;
   const asked = summary.requested_error, points = points_of(ladder), last = points[points.length - 1];
-  const of_quantity = summary.quantities?.length > 0 && Math.abs(summary.total_error - summary.error?.total) > 1e-12 * summary.total_error;
+  const of_quantity = summary.quantities?.length > 0 && !Number.isFinite(summary.total_error);
   const what = of_quantity ? `Error of ${summary.quantities[0].name}` : "Whole error";
   const kind = (of_quantity ? summary.quantities[0] : summary.error)?.kind || "estimated";
   const place = h("div"), form = h("form", { class: "choose", onsubmit: (event) => event.preventDefault() }, choices(() => draw()));

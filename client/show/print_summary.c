@@ -164,6 +164,13 @@ static void print_outcome(FILE *to, const json_t *summary)
     }
 }
 
+/* Was the mesh chosen for the first of the quantities? Its error is that of the grids then. */
+static bool is_of_quantity(const json_t *summary)
+{
+    return json_array_size(json_object_get(summary, "quantities")) > 0 &&
+           !isfinite(client_json_number(summary, "total_error")) && client_json_at(summary, "mesh.ladder");
+}
+
 /* A mesh that was chosen: the grid of the answer, and all that were tried. */
 static void print_ladder(FILE *to, const json_t *summary)
 {
@@ -180,8 +187,8 @@ static void print_ladder(FILE *to, const json_t *summary)
         print_cells(to, client_json_at(summary, "mesh.cells"));
     fprintf(to, " %s after %zu grid%s:\n", refined ? "elements, refined" : "cells, chosen", json_array_size(ladder),
             json_array_size(ladder) > 1 ? "s" : "");
-    fprintf(to, "%12s%9s  %11s  %10s  %10s  %10s  %s\n", "", "unknowns", "whole error", "mesh error", "certified",
-            "iterations", "time");
+    fprintf(to, "%12s%9s  %11s  %10s  %10s  %10s  %s\n", "", "unknowns",
+            is_of_quantity(summary) ? "quantity" : "whole error", "mesh error", "certified", "iterations", "time");
     json_array_foreach((json_t *)ladder, i, level)
     {
         fprintf(to, "%12s%9s  %11s  %10s  %10s  %10s  %s  ", "", number_in_words(d, level, "d", 9),
@@ -394,6 +401,11 @@ static void print_resultants(FILE *to, const json_t *summary)
     fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
 }
 
+static const char *in_words(bool met)
+{
+    return met ? "met" : "not met";
+}
+
 /* Of finite kinematics, where nothing bounds the error. */
 static void print_finite(FILE *to, const json_t *finite, double asked, const char *met)
 {
@@ -436,18 +448,18 @@ static void print_certificate(FILE *to, const json_t *summary)
     const double asked = client_json_number(summary, "requested_error"),
                  total = client_json_number(summary, "total_error");
     const char *outcome = client_json_text(summary, "outcome");
-    const char *met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0 ? "met" : "not met";
+    const bool ended = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
     char absolute[32], gap[32], residual[32];
     if (!json_is_object(certificate))
         return;
     label(to, "certificate");
     if (json_is_object(json_object_get(summary, "finite"))) {
-        print_finite(to, json_object_get(summary, "finite"), asked, met);
+        print_finite(to, json_object_get(summary, "finite"), asked, in_words(ended));
         return;
     }
     /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
     const double left = client_json_number(summary, "contact.geometry.left");
-    const double digits = floor(-log10(left > relative ? left : relative));
+    const double off = left > relative ? left : relative, digits = floor(-log10(off));
     if (!isfinite(relative))
         fputs("nothing could be certified", to);
     else
@@ -459,15 +471,20 @@ static void print_certificate(FILE *to, const json_t *summary)
     else if (!certified && relative > 0 && relative < 1 && digits >= 1)
         fprintf(to, ":\n%12s%.0f digit%s %s certain", "", fmin(digits, 15), digits > 1 ? "s" : "",
                 digits > 1 ? "are" : "is");
+    /* what was asked for is met or not by the number beside it, whatever else the answer is short of */
     if (!isfinite(asked))
         fputs("\n", to);
-    else if (isfinite(total))
+    else if (is_of_quantity(summary)) {
+        fprintf(to, " (asked for %.3g of ", asked);
+        client_print_safe(to, client_json_text(json_array_get(json_object_get(summary, "quantities"), 0), "name"));
+        fprintf(to, ": %s)\n", in_words(ended));
+    } else if (isfinite(total))
         fprintf(to, "\n%12stotal error %s %.2g (asked for %.3g: %s)\n", "", bounded ? "at most" : "about", total, asked,
-                met);
+                in_words(total <= asked));
     else if (asked > 0)
-        fprintf(to, " (asked for %.3g: %s)\n", asked, met);
+        fprintf(to, " (asked for %.3g: %s)\n", asked, in_words(off <= asked));
     else
-        fprintf(to, " (asked for rounding level: %s)\n", met);
+        fprintf(to, " (asked for rounding level: %s)\n", in_words(ended));
     label(to, "");
     fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
             number_in_words(absolute, certificate, "absolute_error", 0), number_in_words(gap, certificate, "gap", 0),

@@ -459,7 +459,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
                         {"lambda_max", summary->lambda_max}},
               4);
     if (summary->grids) {
-        text_number(&t, "total_error", uz_total_error(NULL, summary));
+        if (!(summary->evaluation && summary->evaluation->asked > 0.0)) /* else a quantity chose the mesh */
+            text_number(&t, "total_error", uz_total_error(NULL, summary));
         put_grids(&t, summary->grids);
     }
     if (summary->outcome == UZ_INFEASIBLE || summary->outcome == UZ_OUT_OF_REACH)

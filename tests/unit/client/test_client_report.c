@@ -271,6 +271,31 @@ TEST(summary_without_certificate_says_so)
     json_decref(job);
 }
 
+/* What is met is what was asked for: not a whole error beside a quantity, nor what another number is short of. */
+TEST(what_is_met_is_told_of_what_was_asked_for)
+{
+    static const struct {
+        const char *changes, *says;
+    } CASES[] = {
+        {"{\"requested_error\": 0.05, \"total_error\": 0.18}", "total error about 0.18 (asked for 0.05: not met)"},
+        {"{\"requested_error\": 0.2, \"total_error\": 0.18}", "total error about 0.18 (asked for 0.2: met)"},
+        {"{\"requested_error\": 0.05, \"quantities\": [{\"name\": \"lift\"}], \"mesh\": {\"ladder\": []}}",
+         "(asked for 0.05 of lift: met)"},
+        {"{\"requested_error\": 0.05, \"quantities\": [{\"name\": \"lift\"}], \"mesh\": {\"ladder\": []},"
+         " \"outcome\": \"mesh_limit\"}",
+         "(asked for 0.05 of lift: not met)"},
+        {"{\"outcome\": \"mesh_limit\"}", "(asked for 1e-08: met)"}};
+    for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
+        json_t *job = json_loads(JOB, 0, NULL), *changes = json_loads(CASES[i].changes, 0, NULL);
+        json_object_update(json_object_get(job, "summary"), changes);
+        char *text = summary_of(job);
+        CHECK_MSG(strstr(text, CASES[i].says) != NULL, "%s:\n%s", CASES[i].says, text);
+        free(text);
+        json_decref(changes);
+        json_decref(job);
+    }
+}
+
 TEST(bounds_are_never_shown_smaller)
 {
     static const struct {
