@@ -146,7 +146,7 @@ static void find_known(thin_elements *x, const unsigned char *held)
     for (int64_t i = 0; i < mesh->n_elements * UZ_ELEMENT_SIDES; i++)
         x->known[i] = NAN;
     for (int64_t i = 0; i < x->sides.count; i++) {
-        const uz_face face = x->sides.item[i];
+        const uz_face face = uz_corner_table_item(&x->sides, i);
         const int corners = uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].corners;
         const bool inside = mesh->inside && mesh->inside[face.element] >> face.side & 1;
         int64_t node[UZ_FACE_NODES];
@@ -221,7 +221,8 @@ static bool cross(uz_face *face, const thin_elements *x)
         uz_corner_table_find(&x->sides, &x->model->mesh, node, type_at(x, *face)->side[face->side].corners);
     if (i < 0 || !x->sides.same[i + 1])
         return false;
-    *face = x->sides.item[x->sides.item[i].element == face->element ? i + 1 : i];
+    const uz_face one = uz_corner_table_item(&x->sides, i);
+    *face = one.element == face->element ? uz_corner_table_item(&x->sides, i + 1) : one;
     return true;
 }
 

@@ -10,8 +10,7 @@
 
 /* An item of a bucket while it is sorted: the corners after the lowest one, ascending, -1 beyond them. */
 typedef struct {
-    int64_t corner[UZ_MOST_CORNERS - 1];
-    uz_face item;
+    int64_t corner[UZ_MOST_CORNERS - 1], item;
 } sort_entry;
 
 static void sort_nodes(int64_t *node, int count)
@@ -65,11 +64,7 @@ static int compare_entries(const void *a, const void *b)
 {
     const sort_entry *x = a, *y = b;
     const int order = compare_corners(x->corner, y->corner);
-    if (order)
-        return order;
-    if (x->item.element != y->item.element)
-        return x->item.element < y->item.element ? -1 : 1;
-    return (x->item.side > y->item.side) - (x->item.side < y->item.side);
+    return order ? order : (x->item > y->item) - (x->item < y->item);
 }
 
 /* Calls for every item: counts it into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
@@ -80,7 +75,7 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
         for (int s = sides ? 0 : -1; s <= last; s++) {
             const int64_t lowest = lowest_corner(mesh, (uz_face){e, s});
             if (place)
-                table->item[table->start[lowest]++] = (uz_face){e, s};
+                table->item[table->start[lowest]++] = UZ_CORNER_TABLE_SIDES * e + s + 1;
             else
                 table->start[lowest + 1]++;
         }
@@ -106,13 +101,13 @@ static void sort_buckets(void *ctx, int64_t begin, int64_t end)
     if (!entry)
         x->no_memory = true;
     for (int64_t node = begin; entry && node < end; node++) {
-        uz_face *item = table->item + table->start[node];
-        unsigned char *same = table->same + table->start[node];
-        const int64_t count = table->start[node + 1] - table->start[node];
+        const int64_t first = table->start[node], count = table->start[node + 1] - first;
+        int64_t *item = table->item + first;
+        unsigned char *same = table->same + first;
         for (int64_t i = 0; i < count; i++) {
             sort_entry added = {.item = item[i]};
             int64_t j = i;
-            sorted_corners(corner, x->mesh, item[i]);
+            sorted_corners(corner, x->mesh, uz_corner_table_item(table, first + i));
             memcpy(added.corner, corner + 1, sizeof added.corner);
             for (; count <= FEW && j > 0 && compare_entries(&entry[j - 1], &added) > 0; j--)
                 entry[j] = entry[j - 1];
@@ -172,7 +167,7 @@ int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, 
     int64_t low = table->start[corner[0]], high = table->start[corner[0] + 1], end = high;
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        sorted_corners(there, mesh, table->item[middle]);
+        sorted_corners(there, mesh, uz_corner_table_item(table, middle));
         if (compare_corners(there + 1, wanted + 1) < 0)
             low = middle + 1;
         else
@@ -180,14 +175,14 @@ int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, 
     }
     if (low == end)
         return -1;
-    sorted_corners(there, mesh, table->item[low]);
+    sorted_corners(there, mesh, uz_corner_table_item(table, low));
     return compare_corners(there + 1, wanted + 1) == 0 ? low : -1;
 }
 
 /* A side that lies within a subdivided body has no other with the same corners. */
 static bool is_outside(const uz_mesh *mesh, const uz_corner_table *sides, int64_t i)
 {
-    const uz_face side = sides->item[i];
+    const uz_face side = uz_corner_table_item(sides, i);
     return !sides->same[i] && !sides->same[i + 1] && !(mesh->inside && mesh->inside[side.element] >> side.side & 1);
 }
 
@@ -203,7 +198,7 @@ uz_status uz_outer_sides(uz_group *out, const uz_mesh *mesh, uz_error *err)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld outer sides", (long long)count);
     for (int64_t i = 0; status == UZ_OK && i < sides.count; i++)
         if (is_outside(mesh, &sides, i))
-            out->face[out->n_faces++] = sides.item[i];
+            out->face[out->n_faces++] = uz_corner_table_item(&sides, i);
     uz_corner_table_clear(&sides);
     return status;
 }

@@ -11,10 +11,20 @@ enum { UZ_MOST_CORNERS = UZ_ELEMENT_CORNERS };
 
 typedef struct {
     int64_t *start;      /* n_nodes + 1: the bucket of node i is item[start[i]..start[i + 1]) */
-    uz_face *item;       /* sides; or whole elements, whose `side` is -1; equal ones by element */
+    int64_t *item;       /* sides, or whole elements, as uz_corner_table_item reads them; equal ones by element */
     unsigned char *same; /* count + 1: has the item before it the same corners? The last is 0 */
     int64_t count;
 } uz_corner_table;
+
+/* Elements have six sides at most: one number says all. */
+enum { UZ_CORNER_TABLE_SIDES = 8 };
+
+/* A side; or a whole element, whose `side` is -1. */
+static inline uz_face uz_corner_table_item(const uz_corner_table *table, int64_t i)
+{
+    const int64_t item = table->item[i];
+    return (uz_face){item / UZ_CORNER_TABLE_SIDES, (int)(item % UZ_CORNER_TABLE_SIDES) - 1};
+}
 
 uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool sides, uz_error *err);
 void uz_corner_table_clear(uz_corner_table *table);

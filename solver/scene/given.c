@@ -93,8 +93,10 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
     for (int64_t i = 0; i < table.count && status == UZ_OK; i++)
         if (table.same[i]) { /* two elements on the same corners would count the material twice */
             char what[64];
-            snprintf(what, sizeof what, "has the corners of element %lld", (long long)table.item[i - 1].element);
-            status = uz_given_refuse(given, table.item[i].element, what, "each may be there only once", err);
+            snprintf(what, sizeof what, "has the corners of element %lld",
+                     (long long)uz_corner_table_item(&table, i - 1).element);
+            status = uz_given_refuse(given, uz_corner_table_item(&table, i).element, what,
+                                     "each may be there only once", err);
         }
     uz_corner_table_clear(&table);
     if (status == UZ_OK)

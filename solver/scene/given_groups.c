@@ -144,7 +144,7 @@ static uz_status collect_face(named_parts *parts, group_work *work, const uz_giv
     const int64_t place = uz_corner_table_find(&work->sides, work->mesh, corner, corners);
     if (place < 0)
         return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
-    const int has = uz_mesh_face(there, work->mesh, work->sides.item[place]);
+    const int has = uz_mesh_face(there, work->mesh, uz_corner_table_item(&work->sides, place));
     for (int64_t k = 0; k < count; k++) {
         bool found = false;
         for (int l = 0; l < has; l++)
@@ -153,7 +153,8 @@ static uz_status collect_face(named_parts *parts, group_work *work, const uz_giv
             return refuse_face(work, group, i, "has other nodes in the middle of its edges than the element there");
     }
     parts->n_inner += work->sides.same[place + 1];
-    return append_face(parts, work, work->sides.item[place]) ? UZ_OK : uz_no_memory(work->err, GROUPS);
+    return append_face(parts, work, uz_corner_table_item(&work->sides, place)) ? UZ_OK
+                                                                               : uz_no_memory(work->err, GROUPS);
 }
 
 /* Of a face that occurs again, which happens where groups of one name overlap, the first one stays. code: a number
@@ -279,7 +280,8 @@ uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64
     if (status == UZ_OK && !uz_mesh_group(mesh, "boundary", "", NULL)) { /* faces of one element only, by element */
         named_parts parts = {0};
         for (int64_t i = 0; i < work.sides.count && status == UZ_OK; i++)
-            if (!work.sides.same[i] && !work.sides.same[i + 1] && !append_face(&parts, &work, work.sides.item[i]))
+            if (!work.sides.same[i] && !work.sides.same[i + 1] &&
+                !append_face(&parts, &work, uz_corner_table_item(&work.sides, i)))
                 status = uz_no_memory(work.err, GROUPS);
         parts.faces.count = uz_sort_unique(parts.faces.value, parts.faces.count);
         status = finish_group(&work, "boundary", &parts, status);

@@ -261,9 +261,11 @@ static bool refine_groups(const uz_refinement *x, uz_mesh *fine, const int64_t *
                .has = uz_alloc(mesh->n_elements, 1)};
     uz_corner_table sides = {.count = 0};
     bool room = h.outer_sides && h.outer && h.has && uz_corner_table_build(&sides, mesh, true, NULL) == UZ_OK;
-    for (int64_t i = 0; i < sides.count && room; i++)
+    for (int64_t i = 0; i < sides.count && room; i++) {
+        const uz_face one = uz_corner_table_item(&sides, i);
         if (!sides.same[i] && !sides.same[i + 1])
-            h.outer_sides[sides.item[i].element] |= (unsigned char)(1 << sides.item[i].side);
+            h.outer_sides[one.element] |= (unsigned char)(1 << one.side);
+    }
     uz_corner_table_clear(&sides);
     for (int64_t e = 0; e < fine->n_elements && room; e++) {
         const uz_element_type *type = uz_element_type_of((uz_element_kind)fine->kind[e]);

@@ -148,14 +148,15 @@ static uz_status select_sides(uz_group *out, const selecting *w)
     const uz_corner_table *sides = w->sides;
     int64_t faces = 0, places = 0; /* room for them */
     for (int64_t i = 0; i < sides->count; i++) {
+        const uz_face side = uz_corner_table_item(sides, i);
         int64_t node[UZ_FACE_NODES];
-        if (sides->same[i] || sides->same[i + 1] || !side_is_there(w, sides->item[i]))
+        if (sides->same[i] || sides->same[i + 1] || !side_is_there(w, side))
             continue;
-        const int n = uz_mesh_face(node, w->mesh, sides->item[i]);
+        const int n = uz_mesh_face(node, w->mesh, side);
         if (!uz_grow(&out->face, out->n_faces, 1, &faces, sizeof *out->face) ||
             !uz_grow(&out->node, out->n_nodes, n, &places, sizeof *out->node))
             return uz_no_memory(w->err, "the groups of a scene");
-        out->face[out->n_faces++] = sides->item[i];
+        out->face[out->n_faces++] = side;
         memcpy(out->node + out->n_nodes, node, (size_t)n * sizeof *node);
         out->n_nodes += n;
     }

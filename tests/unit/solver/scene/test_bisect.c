@@ -66,7 +66,7 @@ static double outside(const uz_mesh *mesh)
     for (int64_t i = 0; i < sides.count; i++)
         if (!sides.same[i] && !sides.same[i + 1]) {
             int64_t node[UZ_FACE_NODES];
-            uz_mesh_face(node, mesh, sides.item[i]);
+            uz_mesh_face(node, mesh, uz_corner_table_item(&sides, i));
             sum += measure(mesh, node, mesh->dim);
         }
     uz_corner_table_clear(&sides);
