@@ -414,6 +414,9 @@ static void terms_at(double term[PARAMETERS], double x, double y, double z)
 bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double normal[3], const double *xyz, int n)
 {
     enum { TURNS = 2, FEWEST = 5 };
+    /* Of several that fit the one of the least sum of squares: with xy as two entries of the Hessian, half of its
+     * coefficient each, no turn of t about n changes that sum. */
+    static const double SHARE[PARAMETERS] = {1, 1, 1, 0.5, 1, 1, 1, 1};
     uz_smooth_patch p = {.size = 0};
     memcpy(p.at, at, sizeof p.at);
     memcpy(p.n, normal, sizeof p.n);
@@ -442,7 +445,7 @@ bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double 
             weights += weight;
         }
         for (int j = 0; j < PARAMETERS; j++) /* what few or flat nodes do not tell is 0, but for 1e-6 of rounding */
-            A[j][j] += 1e-10 * weights;
+            A[j][j] += 1e-10 * SHARE[j] * weights;
         solve(A, p.c);
         for (int c = 0; c < 3 && turn + 1 < TURNS; c++)
             p.n[c] -= p.c[0] * p.t[0][c] + p.c[1] * p.t[1][c];

@@ -292,6 +292,31 @@ TEST(rounding_bends_no_patch)
     }
 }
 
+/* ... nor what the axes make of it: a patch that has turned with its nodes is above the same places as before. */
+TEST(axes_bend_no_patch)
+{
+    enum { COLUMNS = 4, ROWS = 2, NODES = COLUMNS * ROWS };
+    double first = NAN;
+    for (int turn = 0; turn < 8; turn++) {
+        const double a = 0.3 * turn, axes[3][3] = {{cos(a), sin(a), 0}, {-sin(a), cos(a), 0}, {0, 0, 1}};
+        double xyz[3 * NODES], between[3] = {0}, normal[3];
+        uz_smooth_patch patch;
+        for (int i = 0; i < NODES; i++) {
+            const int row = i / COLUMNS;
+            const double x = i % COLUMNS - 1 + 0.4 * row, y = 0.8 * row;
+            const double at[3] = {x, y, 0.1 * x * x + 0.2 * x * y};
+            for (int c = 0; c < 3; c++)
+                xyz[3 * i + c] = at[0] * axes[0][c] + at[1] * axes[1][c] + at[2] * axes[2][c];
+        }
+        for (int k = 0; k < 3 * 4; k++) /* in the middle of the face at the first node */
+            between[k % 3] += 0.25 * xyz[3 * (k / 6 * COLUMNS + k / 3 % 2) + k % 3];
+        CHECK(uz_smooth_patch_fit(&patch, xyz, axes[2], xyz + 3, NODES - 1));
+        const double height = uz_smooth_patch_height(normal, &patch, between);
+        first = turn == 0 ? height : first;
+        CHECK_MSG(fabs(height - first) < 1e-6, "%g: %g", height, height - first);
+    }
+}
+
 /* Cones have six parameters: any six points are on one, whose normals may be anywhere. */
 TEST(six_nodes_tell_no_cone)
 {
