@@ -63,7 +63,7 @@ typedef struct {
     double create, load, growth, vectors;
     hardness making, loading;
 } cells_costs;
-static const cells_costs PLANE_CELLS = {373.0, 212.0, 0.1, 26.0, {0.4, 0.0, 0.07}, {0.29, 0.0, 0.35}},
+static const cells_costs PLANE_CELLS = {373.0, 212.0, 0.1, 27.5, {0.4, 0.0, 0.07}, {0.29, 0.0, 0.35}},
                          SOLID_CELLS = {225.0, 170.0, 0.06, 25.0, {0.45, 0.35, 0.0}, {0.29, 0.3, 0.2}};
 #define CELLS_FLOPS 40.0 /* for each dof, of what is as much as a step */
 #define CELLS_CYCLE 20.0 /* a cycle and a product, with the vectors */

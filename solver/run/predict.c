@@ -64,6 +64,8 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
  * which it takes minutes. */
 #define ASSEMBLY_BYTES 1000.0
 #define MOST_ASSEMBLED 4e6
+/* Of cells, which are predicted by formulas, and of which a comparison alone would have to be analysed: in a second. */
+#define MOST_ANALYSED 1e5
 
 static bool may_be_assembled(double dofs, const uz_settings *settings)
 {
@@ -107,7 +109,8 @@ static uz_status predict_finite(uz_prediction *out, const uz_body_model *model, 
     uz_body_model large = *model;
     uz_prediction of_large = *out;
     uz_status status = UZ_OK;
-    if ((model->brick && !may_be_assembled((double)model->d, settings)) || !find_coupled(&scene, problem, model))
+    if ((model->brick && ((double)model->d > MOST_ANALYSED || !may_be_assembled((double)model->d, settings))) ||
+        !find_coupled(&scene, problem, model))
         return UZ_OK;
     /* and the model does not yet, or has no matrix */
     const bool couples = model->brick || (scene.n_loads > 0 && (!finite || problem->n_cases > 0));

@@ -1,6 +1,7 @@
 /* Whole solves without a factor: the answers of the other forms, bounds that hold at every accuracy, and the memory
  * rule that chooses this form. */
 #include "run/cost.h"
+#include "run/setup.h"
 #include "run/setup_cache.h"
 #include "harness.h"
 #include "membrane.h"
@@ -760,4 +761,26 @@ TEST(guesses_of_weakly_held_bodies_are_solved_as_far_as_it_takes)
     }
     uz_result_free(got);
     uz_problem_clear(&problem);
+}
+#include "run/setup.h"
+
+/* Of few cells across a factor is a narrow band, which later loads hardly take time on. */
+TEST(narrow_plane_boxes_have_a_factor)
+{
+    const struct {
+        int64_t nx, ny, cases;
+        uz_body_extent extent;
+    } of[] = {{400, 80, 0, UZ_BODY_CELLS},
+              {400, 80, 10, UZ_BODY_CELLS},
+              {1000, 20, 0, UZ_BODY_CELLS},
+              {1000, 20, 10, UZ_BODY_SUPPORTED},
+              {8000, 5, 0, UZ_BODY_SUPPORTED}};
+    const uz_settings s = uz_settings_default();
+    for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
+        uz_problem problem = scene_problem(of[k].nx, of[k].ny);
+        problem.n_cases = of[k].cases;
+        CHECK_INT(uz_setup_extent(&problem, &s), of[k].extent);
+        problem.n_cases = 0;
+        uz_problem_clear(&problem);
+    }
 }
