@@ -76,7 +76,7 @@ def test_by_name(s):
 
 @options("--workers", "1")
 def test_predicted_seconds_follow_what_jobs_took(s):
-    body = plate([300, 100], operator="matrix_free")
+    body = plate([600, 200], operator="matrix_free")
     model = expect(s.post(body, query="?validate=true"), 200).json["predicted"]["seconds"]
     costs = [s.solve(body)["summary"]["cost"] for _ in range(4)]
     check(min(cost["actual"]["seconds"] for cost in costs) >= 0.05, "too short to count", costs)
@@ -174,7 +174,7 @@ def test_the_next_body_lands_on_memory_that_is_there(s):
     faults = []
     for k in range(7):
         before = page_faults(s)
-        job = s.solve(plate([300 + k, 100]))
+        job = s.solve(plate([300 + k, 100], operator="condensed"))
         check(job["status"] == "successful" and not job["summary"]["factor"]["cached"], job)
         faults.append(page_faults(s) - before)
         time.sleep(1.2)  # for the housekeeper
@@ -182,7 +182,7 @@ def test_the_next_body_lands_on_memory_that_is_there(s):
     check(faults[0] > 2000, faults)
     check(sorted(faults[-4:])[1] < faults[0] / 4, faults)
     # So does the next answer; what is shared goes once none follows.
-    body, tries = plate([420, 140]), 0
+    body, tries = plate([420, 140], operator="condensed"), 0
     s.solve(body)
     while memory_shared(s) < 1.5:  # unless it took so long to look that it has gone
         tries += 1
