@@ -299,29 +299,16 @@ static inline __attribute__((always_inline)) void layer(const uz_brick_product *
     }
 }
 
-UZ_AVX2_FMA static void solid_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
-                                   const uz_brick *brick, const double *block)
-{
-    layer(room, of, brick, block, 3);
-}
-
-static void solid_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
-                         const double *block)
-{
-    layer(room, of, brick, block, 3);
-}
-
-UZ_AVX2_FMA static void plane_wide(const uz_brick_product *room, struct uz_brick_product_room *of,
-                                   const uz_brick *brick, const double *block)
-{
-    layer(room, of, brick, block, 2);
-}
-
-static void plane_narrow(const uz_brick_product *room, struct uz_brick_product_room *of, const uz_brick *brick,
-                         const double *block)
-{
-    layer(room, of, brick, block, 2);
-}
+#define OF_AXES(NAME, AXES, FOR_PROCESSOR)                                                                             \
+    FOR_PROCESSOR static void NAME(const uz_brick_product *room, struct uz_brick_product_room *of,                     \
+                                   const uz_brick *brick, const double *block)                                         \
+    {                                                                                                                  \
+        layer(room, of, brick, block, AXES);                                                                           \
+    }
+OF_AXES(solid_wide, 3, UZ_AVX2_FMA)
+OF_AXES(solid_narrow, 3, )
+OF_AXES(plane_wide, 2, UZ_AVX2_FMA)
+OF_AXES(plane_narrow, 2, )
 
 /* What a plane adds to x'y, where dofs that are supported and do not move count for nothing. */
 static double along_plane(const struct uz_brick_product_room *of, int64_t n)

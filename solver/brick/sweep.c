@@ -89,29 +89,16 @@ static inline __attribute__((always_inline)) void layer(const uz_brick_level *le
 }
 
 /* Functions of their own: a slab has to compute what the one below it has to the last bit. */
-__attribute__((noinline)) UZ_AVX2_FMA static void solid_wide(const uz_brick_level *level, float *sums, const nodes *x,
-                                                             float *near, float *far)
-{
-    layer(level, sums, x, near, far, 3);
-}
-
-__attribute__((noinline)) static void solid_narrow(const uz_brick_level *level, float *sums, const nodes *x,
-                                                   float *near, float *far)
-{
-    layer(level, sums, x, near, far, 3);
-}
-
-__attribute__((noinline)) UZ_AVX2_FMA static void plane_wide(const uz_brick_level *level, float *sums, const nodes *x,
-                                                             float *near, float *far)
-{
-    layer(level, sums, x, near, far, 2);
-}
-
-__attribute__((noinline)) static void plane_narrow(const uz_brick_level *level, float *sums, const nodes *x,
-                                                   float *near, float *far)
-{
-    layer(level, sums, x, near, far, 2);
-}
+#define OF_AXES(NAME, AXES, FOR_PROCESSOR)                                                                             \
+    FOR_PROCESSOR static __attribute__((noinline)) void NAME(const uz_brick_level *level, float *sums, const nodes *x, \
+                                                             float *near, float *far)                                  \
+    {                                                                                                                  \
+        layer(level, sums, x, near, far, AXES);                                                                        \
+    }
+OF_AXES(solid_wide, 3, UZ_AVX2_FMA)
+OF_AXES(solid_narrow, 3, )
+OF_AXES(plane_wide, 2, UZ_AVX2_FMA)
+OF_AXES(plane_narrow, 2, )
 
 /* What is done to a plane: x = d = q inverse b; of a polynomial, x += d, its first step, d = q inverse (b - K x), and
  * the others, d = p d + the same; t = b - K x and t = K x at free dofs. */
