@@ -10,7 +10,9 @@
  * is sharper than what is known beforehand (Kuczynski and Wozniakowski, same journal, 13 (1992)), as it sees the Ritz
  * values converge. That orthogonality is lost on the way does no harm: the coefficients are those of an exact process
  * on a matrix whose eigenvalues lie within rounding of those of this one (Greenbaum, Linear Algebra Appl. 113 (1989)).
- */
+ *
+ * Where the multigrid takes two residuals at once (both.c) each has a variance of x_1'r0 of 1 at least, as it is drawn,
+ * and fails with the root of that probability. */
 #include "amg/amg.h"
 
 #include "core/alloc.h"
