@@ -114,7 +114,11 @@ static void fill_diagonals(void *ctx, int part)
     const diagonal *x = ctx;
     const int axes = x->brick->axes;
     const int64_t *n = x->brick->cells, planes = n[2] + 1, first = planes * part / x->parts,
-                  end = planes * (part + 1) / x->parts;
+                  end = planes * (part + 1) / x->parts, d = x->brick->d;
+    for (int64_t j = d * part / x->parts; j < d * (part + 1) / x->parts; j++) {
+        x->to->ptr[j + 1] = j + 1;
+        x->to->idx[j] = (int32_t)j;
+    }
     const int64_t *dof = x->brick->dof + axes * first * (n[0] + 1) * (n[1] + 1);
     for (int64_t k = first; k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++)
@@ -130,10 +134,6 @@ uz_status uz_brick_diagonal(uz_csc *out, const uz_brick *brick, uz_error *err)
     const uz_status status = uz_csc_init(out, brick->d, brick->d, brick->d, err);
     if (status != UZ_OK)
         return status;
-    for (int64_t j = 0; j < brick->d; j++) {
-        out->ptr[j + 1] = j + 1;
-        out->idx[j] = (int32_t)j;
-    }
     diagonal x = {
         .to = out, .brick = brick, .parts = brick->cells[2] < PARTS_MOST ? (int)brick->cells[2] + 1 : PARTS_MOST};
     sum_diagonals(&x);

@@ -38,18 +38,6 @@ typedef struct {
     double energy; /* norm of the response on the coarsest of them */
 } nested;
 
-static double dot(const float *x, const float *y, int64_t n)
-{
-    double sum[4] = {0.0};
-    int64_t i = 0;
-    for (; i + 4 <= n; i += 4)
-        for (int k = 0; k < 4; k++)
-            sum[k] += (double)x[i + k] * (double)y[i + k];
-    for (; i < n; i++)
-        sum[0] += (double)x[i] * (double)y[i];
-    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
-
 static bool allocate(nested *x, int last)
 {
     bool ok = true;
@@ -152,35 +140,58 @@ static double precondition(const nested *x, int l)
     const int64_t n = x->mg->level[l].axes * x->mg->level[l].size;
     memcpy(x->room->v[l].b, x->r, (size_t)n * sizeof(float));
     uz_brick_cycle(x->mg, x->room, l);
-    return dot(x->r, x->room->v[l].x, n);
+    return uz_long_dot_single(n, x->r, x->room->v[l].x);
+}
+
+/* Steps on a grid as the threads that share its vectors see them. */
+typedef struct {
+    const float *z;
+    float *u, *r, *direction, *q, factor;
+} steps;
+
+static void step(void *ctx, int64_t begin, int64_t end)
+{
+    const steps *s = ctx;
+    const float alpha = s->factor, *restrict direction = s->direction, *restrict q = s->q;
+    float *restrict u = s->u, *restrict r = s->r;
+    for (int64_t i = begin; i < end; i++) {
+        u[i] += alpha * direction[i];
+        r[i] += alpha * q[i];
+    }
+}
+
+static void turn(void *ctx, int64_t begin, int64_t end)
+{
+    const steps *s = ctx;
+    const float beta = s->factor, *restrict z = s->z;
+    float *restrict direction = s->direction;
+    for (int64_t i = begin; i < end; i++)
+        direction[i] = z[i] + beta * direction[i];
 }
 
 /* Conjugate gradients on the dofs that are not held; r: the residual there. */
 static void iterate(nested *x, int l)
 {
     const int64_t n = x->mg->level[l].axes * x->mg->level[l].size;
-    const float *inverse = x->room->held[l], *z = x->room->v[l].x;
+    const float *inverse = x->room->held[l];
+    steps s = {x->room->v[l].x, x->grid[l].u, x->r, x->direction, x->q, 0.0F};
     const uz_brick_vectors v = {.x = x->direction, .b = x->zero, .t = x->q, .d = x->q, .inverse = inverse};
     for (int64_t i = 0; i < n; i++)
         x->r[i] = inverse[i] != 0.0F ? x->r[i] : 0.0F;
     double square = precondition(x, l);
     x->energy = fmax(x->energy, sqrt(fmax(0.0, square)));
     const double goal = (x->mg->level[l].axes == 2 ? AS_GOOD_IN_A_PLANE : AS_GOOD_AS_A_GRID) * x->energy;
-    memcpy(x->direction, z, (size_t)n * sizeof(float));
+    memcpy(x->direction, s.z, (size_t)n * sizeof(float));
     for (int k = 0; k < ITERATIONS_MOST && square > goal * goal; k++) {
         uz_brick_residual(&x->mg->level[l], &v, &x->room->planes); /* q = -K direction */
-        const double curvature = -dot(x->direction, x->q, n), before = square;
+        const double curvature = -uz_long_dot_single(n, x->direction, x->q), before = square;
         if (!(curvature > 0.0))
             return;
-        const float alpha = (float)(square / curvature);
-        for (int64_t i = 0; i < n; i++) {
-            x->grid[l].u[i] += alpha * x->direction[i];
-            x->r[i] += alpha * x->q[i];
-        }
+        s.factor = (float)(square / curvature);
+        uz_by_pieces(step, &s, n);
         square = precondition(x, l);
-        const float beta = (float)(square / before);
-        for (int64_t i = 0; i < n; i++)
-            x->direction[i] = z[i] + beta * x->direction[i];
+        s.factor = (float)(square / before);
+        uz_by_pieces(turn, &s, n);
     }
 }
 

@@ -1,10 +1,16 @@
 #include "core/alloc.h"
 
+#include "core/aside.h"
+
 #include <errno.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
+
+/* What one thread clears by itself: some 200 microseconds. Of smaller blocks pages that nobody has touched stay so. */
+#define CLEARED_ALONE UZ_HUGE_PAGE
 
 static bool bytes_for(int64_t count, size_t size, size_t *bytes)
 {
@@ -43,12 +49,32 @@ void *uz_alloc(int64_t count, size_t size)
     return bytes_for(count, size, &bytes) ? uz_malloc_huge(bytes) : NULL;
 }
 
+/* A block as the threads that clear it see it. */
+typedef struct {
+    char *block;
+    size_t bytes;
+    int parts;
+} clearing;
+
+static void clear_part(void *ctx, int part)
+{
+    const clearing *c = ctx;
+    const size_t each = c->bytes / (size_t)c->parts, begin = each * (size_t)part,
+                 end = part + 1 == c->parts ? c->bytes : begin + each;
+    memset(c->block + begin, 0, end - begin);
+}
+
 void *uz_alloc_zero(int64_t count, size_t size)
 {
     size_t bytes;
-    void *block = bytes_for(count, size, &bytes) ? calloc(1, bytes) : NULL;
+    if (!bytes_for(count, size, &bytes))
+        return NULL;
+    const int threads = bytes < CLEARED_ALONE ? 1 : uz_aside_threads();
+    void *block = threads < 2 ? calloc(1, bytes) : malloc(bytes);
     if (block && bytes >= UZ_HUGE_PAGE)
         ask_for_huge_pages(block, bytes);
+    if (block && threads > 1)
+        uz_aside_share(clear_part, &(clearing){block, bytes, threads}, threads);
     return block;
 }
 
