@@ -98,8 +98,10 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
     if (box->contradictory)
         return false;
     x->known_u = x->known_r = NULL;
-    if (!keep)
+    if (!keep) {
         memset(box->u, 0, (size_t)x->load.dual->d * sizeof *box->u);
+        box->balanced = false;
+    }
     for (int64_t b = 0; b < box->n; b++) {
         const int64_t j = box->dof[b];
         int64_t holder = -1;
@@ -114,8 +116,11 @@ bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
         }
         box->holder[b] = holder;
         box->fixed[j] = holder >= 0;
-        if (holder >= 0)
-            box->u[j] = bounds->scale[holder] > 0.0 ? box->top[b] : box->bottom[b];
+        if (holder < 0)
+            continue;
+        const double held = bounds->scale[holder] > 0.0 ? box->top[b] : box->bottom[b];
+        box->balanced = box->balanced && box->u[j] == held;
+        box->u[j] = held;
     }
     return true;
 }
@@ -216,6 +221,7 @@ void uz_bounded_balance(const uz_sparse_load *x, bool roughly)
     const bool entries = uz_sparse_has_entries(x->load.dual);
     if (roughly || x->room || !entries)
         balance_by_product(x);
+    box->balanced = true;
     if (roughly || !entries || (x->room && !has_doubts(box)))
         return;
     box->largest = -1.0;
@@ -481,6 +487,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     if (!box || box->contradictory || !uz_sparse_has_entries(load->dual) ||
         !make_point(x)) /* sweeps go by entries of K */
         return false;
+    box->balanced = false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
     const bool there = approach(box, K, x->known_u ? box->u : x->base, x->work);
     (void)energy(box, K, box->point);

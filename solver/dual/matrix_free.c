@@ -559,15 +559,18 @@ typedef struct {
     const double *from;
 } turning;
 
-/* K u in cg->r becomes p - K u. Returns u'K u. */
+/* cg->r becomes p - K u of K u, or where that is known of force = K u - p. Returns u'K u. */
 static double leave_residual(void *ctx, int64_t begin, int64_t end)
 {
     enum { IN_CACHE = 2048 }; /* numbers, which stay in the cache */
     const free_load *x = ctx;
-    const double *u = x->sparse.box->u, *p = x->sparse.p;
+    const uz_bounded *box = x->sparse.box;
+    const double *u = box->u, *p = x->sparse.p, *force = box->balanced ? box->force : NULL;
     double *r = x->cg.r, sum = 0.0;
     for (int64_t from = begin; from < end; from += IN_CACHE) {
         const int64_t to = end - from < IN_CACHE ? end : from + IN_CACHE;
+        for (int64_t j = from; force && j < to; j++)
+            r[j] = force[j] + p[j];
         sum += uz_dot(to - from, u + from, r + from);
         for (int64_t j = from; j < to; j++)
             r[j] = p[j] - r[j];
@@ -611,7 +614,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
     double tolerance = at_once ? least : fmax(least, x->coarse);
     bool ended = false;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
-    uz_sparse_multiply(load, cg->r, box->u);
+    if (!box->balanced)
+        uz_sparse_multiply(load, cg->r, box->u);
     double square = uz_sum_by_pieces(leave_residual, x, d); /* u'K u */
     for (bool go_on = true; status == UZ_OK && go_on;) {
         const double goal = goal_of(x, tolerance, square);
@@ -632,6 +636,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
         }
         stop.begun = true;
         x->wanted = goal / root;
+        box->balanced = false;
         status = uz_cg_solve(&info, box->u, cg, load->K, x->sparse.p, &stop, err);
         if (status != UZ_OK)
             break;
@@ -818,6 +823,7 @@ static bool start_on_grids(free_load *x, bool *active)
     if (!box || x->started)
         return false;
     x->started = true;
+    box->balanced = false;
     const uz_limits limits = {box->n, box->dof, box->bottom, box->top};
     if (!box->contradictory && (held = uz_alloc(box->n, sizeof *held)))
         (void)mg->kind->start(mg, x->cg.room, &found, box->u, held, x->sparse.p, &limits, &x->stop, &ignored);

@@ -205,7 +205,8 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     }
     for (int64_t i = 0; i < dual->m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
-    double distance = sqrt(fmax(0.0, correction_energy(load, c, x->work2))) + x->slack;
+    /* not in work2, which has the forces that the next guess begins with */
+    double distance = sqrt(fmax(0.0, correction_energy(load, c, x->work))) + x->slack;
     *bound2 = distance * distance + 2.0 * complementarity;
     return UZ_OK;
 }

@@ -24,6 +24,7 @@ typedef struct {
     bool *fixed;            /* d: holder >= 0 */
     double *u, *r;          /* d, m */
     double *force;          /* d, work2 of the load: a residual of equilibrium */
+    bool balanced;          /* force = K u - p */
     double *size;           /* d: what its rounding is in proportion to; NULL: K has no entries */
     double largest;         /* of |u|, >= 0: size was told by it, roughly; -1: by the terms of the sums */
     double *point;          /* d: where the sweeps ended; NULL before the first: then its energy is INFINITY */

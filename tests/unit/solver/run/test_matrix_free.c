@@ -3,6 +3,7 @@
 #include "run/cost.h"
 #include "run/setup.h"
 #include "run/setup_cache.h"
+#include "linalg/pieces.h"
 #include "harness.h"
 #include "membrane.h"
 #include "qp_fixture.h"
@@ -762,7 +763,6 @@ TEST(guesses_of_weakly_held_bodies_are_solved_as_far_as_it_takes)
     uz_result_free(got);
     uz_problem_clear(&problem);
 }
-#include "run/setup.h"
 
 /* Of few cells across a factor is a narrow band, which later loads hardly take time on. */
 TEST(narrow_plane_boxes_have_a_factor)
@@ -783,4 +783,54 @@ TEST(narrow_plane_boxes_have_a_factor)
         problem.n_cases = 0;
         uz_problem_clear(&problem);
     }
+}
+
+/* A certificate's correction between two solves for the same rows leaves the forces alone that the second begins with.
+ */
+TEST(the_same_rows_have_the_same_answer_after_a_correction)
+{
+    uz_problem problem = scene_problem(200, 66);
+    const uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    const uz_stop stop = {.deadline = INFINITY};
+    uz_setup *setup = NULL;
+    uz_dual_load *load = NULL;
+    uz_reuse reused;
+    uz_error err = {0};
+    CHECK_INT(uz_setup_acquire(&setup, &reused, NULL, &problem, NULL, &s, NULL, &err), UZ_OK);
+    const int64_t m = setup->dual->m, d = setup->dual->d;
+    double *p = vector(d), *h = vector(m), *r = vector(m), *none = vector(m), *u[] = {vector(d), vector(d)};
+    double bound, most = 0.0;
+    bool *held = malloc((size_t)m * sizeof *held);
+    for (int64_t j = 0; j < d; j++)
+        p[j] = sin(0.1 * (double)j);
+    CHECK(uz_dual_load_create(&load, setup->dual, uz_setup_K(setup, &problem), p, h, &err) == UZ_OK);
+    load->equations = true;
+    CHECK(uz_dual_load_aim(load, 1e-6, &stop, &err) == UZ_OK);
+    for (int k = 0; k < 2; k++) {
+        uz_active_end end;
+        double *g = vector(m);
+        memset(held, true, (size_t)m * sizeof *held);
+        CHECK(uz_dual_load_solve_active(load, &end, r, g, held, &err) == UZ_OK);
+        CHECK_INT(end, UZ_ACTIVE_SOLVED);
+        CHECK(uz_dual_load_recover(load, u[k], r, false, &err) == UZ_OK);
+        /* of the body without reactions, whose gaps are all to be closed */
+        CHECK(uz_dual_load_apply(load, g, none, &err) == UZ_OK);
+        memset(held, true, (size_t)m * sizeof *held);
+        CHECK(uz_dual_load_correct(load, &bound, INFINITY, none, load->g0, held, &err) == UZ_OK);
+        CHECK(isfinite(bound));
+        free(g);
+    }
+    for (int64_t j = 0; j < d; j++)
+        most = fmax(most, fabs(u[0][j] - u[1][j]));
+    CHECK_MSG(most <= 1e-4 * uz_long_max(d, u[0]), "%g of %g", most, uz_long_max(d, u[0]));
+    free(p);
+    free(h);
+    free(r);
+    free(none);
+    free(u[0]);
+    free(u[1]);
+    free(held);
+    uz_dual_load_free(load);
+    uz_setup_release(NULL, setup);
+    uz_problem_clear(&problem);
 }
