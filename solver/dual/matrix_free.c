@@ -501,6 +501,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, double enough
 /* Where solves are elsewhere, looking at a guess on the way costs as much as some steps: what is to be solved within
  * this many times the last tolerance, so that the next guess would be for that, is solved for it at once. */
 #define AT_ONCE 10.0
+#define SOON    4.0
 /* Nor better, where few dofs have bounds, than to this share of what the guess changes: the next one would change more
  * than that. Plane bodies take more guesses above this share, solids none of 0.2. */
 #define GUESS_KEPT 0.05
@@ -610,7 +611,7 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
                  root = sqrt(load->dual->amg->info.lambda);
     stepwise on_way = {x, g, active, least};
     const uz_multigrid_kind *kind = cg->mg->kind;
-    const bool at_once = kind->solve && x->coarse < AT_ONCE * least, few = uz_bounds_are_few(m, d);
+    const bool at_once = x->coarse < (kind->solve ? AT_ONCE : SOON) * least, few = uz_bounds_are_few(m, d);
     double tolerance = at_once ? least : fmax(least, x->coarse);
     bool ended = false;
     uz_status status = uz_cg_hold(cg, load->K, box->fixed, &x->stop, err);
@@ -887,6 +888,11 @@ static bool guess_active(uz_dual_load *load, bool *active)
         return start_on_grids(x, active);
     if (few && first && isfinite(x->base_aim)) {
         start_deep(x, active);
+        return true;
+    }
+    if (few && uz_sparse_has_entries(load->dual) && x->sparse.known_r == x->sparse.box->r &&
+        uz_bounded_shrink(&x->sparse, active)) {
+        x->coarse *= NEXT_TOLERANCE;
         return true;
     }
     if (few && x->refused++ < REFUSED_MOST)

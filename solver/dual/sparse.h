@@ -87,6 +87,9 @@ void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x);
 bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep);
 void uz_bounded_balance(const uz_sparse_load *x, bool roughly);
 void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active);
+/* After an answer of `active`, a guess with far too many rows: the next one. False: it is no such guess, or memory is
+ * short; active stays. */
+bool uz_bounded_shrink(const uz_sparse_load *x, bool *active);
 /* y (m): the ray of two bounds on one dof that cross; false, y untouched: none do. */
 bool uz_bounded_crossed(const uz_sparse_load *x, double *y);
 
