@@ -18,8 +18,8 @@ typedef enum { FREE, PRESSES, PULLS } part;
 /* The dofs with bounds, by their place in the list of these, and links between those that share an element. */
 typedef struct {
     const uz_bounded *box;
-    part *part;        /* n */
-    int32_t *links;    /* n: of what pulls, to the next dof outside; of what presses, how many more go behind it */
+    part *part;     /* n */
+    int32_t *links; /* n: of what pulls, to the next dof outside; of what presses, how many more go behind it */
     int32_t (*pair)[2];
     int64_t n, n_pairs, pulling, pressing;
 } band;
