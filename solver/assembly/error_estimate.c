@@ -13,26 +13,17 @@
 #include "assembly/thin_elements.h"
 #include "core/alloc.h"
 #include "core/vector3.h"
+#include "linalg/pieces.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Of quadratic triangles, tetrahedra and wedges the average over the few elements at a node takes a part of the error
- * with it: eta is 0.68 to 0.82 of the error of smooth fields, and eta^2 is taken for this much of it where it is told.
- */
-#define HIDDEN (16. / 9)
-/* A tetrahedron alone at its nodes differs from no mean. */
-#define LEAST_LEFT 0.25
-/* ... but for what volumes by two rules differ in, of elements with bent edges. */
-#define ALONE 1e-2
-
 typedef struct {
     const uz_body_model *model;
     uz_nodal_strains nodal; /* rows: stresses, once they are recovered */
     uz_stress_sums sums;
-    bool whole; /* with what is hidden */
 } estimate;
 
 void uz_energy_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
@@ -46,38 +37,13 @@ void uz_energy_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, 
     uz_strain_rule_at(rule, kind, model, formulation, (const double(*)[3])point, weight, energy->count);
 }
 
+/* Of simplices one point, where their strain is known (stress_lanes.c). */
 static void make_rule(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation)
 {
-    uz_energy_rule(rule, kind, ((const estimate *)ctx)->model->kind, formulation);
-}
-
-/* The mean over the elements at a node has a part of what it is compared with: of N that err alike and by chance, the
- * squares of the differences sum up to N - 1 of N parts (Bessel's correction). Tetrahedra are irregular, and a coarse
- * solid has most of its nodes at the surface, with few of them. */
-static void take_own_part(uz_lanes *times, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES],
-                          const uz_nodal_strains *nodal)
-{
-    uz_lanes volume = {0};
-    for (int p = 0; p < group->rule.asked; p++)
-        volume += group->shape.volume[p];
-    for (int l = 0; l < UZ_STRAIN_LANES; l++) {
-        double left = 0;
-        for (int a = 0; a < group->rule.nodes; a++)
-            left += 1 - fmin(1, volume[l] / nodal->rows[place[l][a] * nodal->size + nodal->strains]);
-        if (left > ALONE * group->rule.nodes) /* else it is compared with none of its own (nodal_strains.c) */
-            (*times)[l] /= fmax(LEAST_LEFT, left / group->rule.nodes);
-    }
-}
-
-void uz_whole_difference(uz_lanes *times, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES],
-                         const uz_nodal_strains *nodal)
-{
-    const uz_element_kind kind = group->rule.kind;
-    *times = (uz_lanes){0} + 1;
-    if (kind == UZ_TET4 || kind == UZ_TET10)
-        take_own_part(times, group, place, nodal);
-    if (kind == UZ_TRI6 || kind == UZ_TET10 || kind == UZ_WEDGE15)
-        *times *= HIDDEN;
+    const uz_model model = ((const estimate *)ctx)->model->kind;
+    uz_strain_rule_at(rule, kind, model, formulation, &uz_element_type_of(kind)->centre, NULL, 1);
+    if (!rule->simplex)
+        uz_energy_rule(rule, kind, model, formulation);
 }
 
 static void compare(void *ctx, const uz_strain_group *group)
@@ -85,29 +51,36 @@ static void compare(void *ctx, const uz_strain_group *group)
     estimate *x = ctx;
     const int64_t *place[UZ_STRAIN_LANES];
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
-    x->sums.times = (uz_lanes){0} + 1;
-    if (x->whole)
-        uz_whole_difference(&x->sums.times, group, place, &x->nodal);
     uz_stress_rows_compare(&x->sums, x->nodal.rows, x->nodal.size, group, place);
 }
 
-/* The integrals of both stresses, added to the sums; whole: with what is hidden in them. */
-static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, bool whole, uz_error *err)
+/* Of the means at nodes, from what they are means of. */
+static void find_stresses(void *ctx, int64_t begin, int64_t end)
+{
+    const estimate *x = ctx;
+    const uz_nodal_strains *nodal = &x->nodal;
+    const int n = nodal->strains;
+    for (int64_t i = begin; i < end; i++) {
+        const uz_lame lame = x->model->materials[nodal->material ? nodal->material[i] : 0].lame;
+        double *row = nodal->rows + i * nodal->size, thermal[UZ_ELEMENT_STRESSES];
+        if (nodal->size > n + 1 && row[n + 1] != 0) {
+            uz_thermal_strain(thermal, x->model->kind, lame, row[n + 1]);
+            for (int c = 0; c < n; c++)
+                row[c] -= thermal[c];
+        }
+        uz_elastic_stress(row, x->model->kind, lame, row);
+    }
+}
+
+/* The integrals of both stresses, added to the sums. */
+static uz_status integrate(uz_stress_sums *sums, const uz_strain_source *from, uz_error *err)
 {
     const uz_body_model *model = from->model;
-    estimate x = {.model = model, .sums = *sums, .whole = whole};
+    estimate x = {.model = model, .sums = *sums};
     const uz_strain_work work = {make_rule, compare, &x};
     uz_status status = uz_nodal_strains_recover(&x.nodal, from, UZ_CONTINUE_LINEAR, NULL, err);
-    const int n = x.nodal.strains;
-    for (int64_t i = 0; i < x.nodal.count && status == UZ_OK; i++) { /* stresses from what they are averages of */
-        const uz_lame lame = model->materials[x.nodal.material ? x.nodal.material[i] : 0].lame;
-        double *row = x.nodal.rows + i * x.nodal.size, thermal[UZ_ELEMENT_STRESSES] = {0};
-        if (x.nodal.size > n + 1)
-            uz_thermal_strain(thermal, model->kind, lame, row[n + 1]);
-        for (int c = 0; c < n; c++)
-            row[c] -= thermal[c];
-        uz_elastic_stress(row, model->kind, lame, row);
-    }
+    if (status == UZ_OK)
+        uz_by_pieces(find_stresses, &x, x.nodal.count);
     if (status == UZ_OK)
         status = uz_strain_groups(&work, from, NULL, err);
     uz_nodal_strains_clear(&x.nodal);
@@ -120,7 +93,7 @@ uz_status uz_mesh_error_energy(double *energy, double *eta2, const uz_body_model
 {
     uz_stress_sums sums = {.eta2_of = eta2};
     const uz_strain_source from = {.model = model, .nodal = nodal, .free_strain = free_strain};
-    const uz_status status = integrate(&sums, &from, false, err);
+    const uz_status status = integrate(&sums, &from, err);
     *energy = sums.eta2;
     return status;
 }
@@ -323,9 +296,9 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         own = uz_alloc_zero(model->mesh.n_elements, sizeof *own);
         status = own ? UZ_OK : UZ_ERR_MEMORY;
     }
-    uz_stress_sums sums = {.eta2_of = eta2 ? eta2 : own};
+    uz_stress_sums sums = {.hidden = true, .eta2_of = eta2 ? eta2 : own};
     if (status == UZ_OK)
-        status = integrate(&sums, &from, true, NULL);
+        status = integrate(&sums, &from, NULL);
     for (int64_t e = 0; e < model->mesh.n_elements && least && status == UZ_OK; e++) {
         sums.eta2 += fmax(0, least[e] - sums.eta2_of[e]);
         sums.eta2_of[e] = fmax(least[e], sums.eta2_of[e]);

@@ -12,6 +12,7 @@
 #include "assembly/stress_lanes.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/pieces.h"
 #include "scene/mesh.h"
 
 #include <stdlib.h>
@@ -21,6 +22,7 @@ typedef struct {
     uz_nodal_strains *out;
     const uz_body_model *model;
     uz_continuation how;
+    unsigned char *seen; /* NULL, or by place: 1 where there is one element, 2 where there are more */
     double share[UZ_ELEMENT_KINDS][UZ_ELEMENT_NODES][UZ_ELEMENT_SAMPLES];
 } recovery;
 
@@ -121,6 +123,9 @@ static void add_group(void *ctx, const uz_strain_group *group)
     uz_nodal_places(place, r->out, group, &r->model->mesh);
     uz_strain_rows_add(r->out->rows, r->out->size, group, place,
                        shared ? (const double(*)[UZ_ELEMENT_SAMPLES])r->share[group->rule.kind] : NULL);
+    for (int l = 0; l < group->count && r->seen; l++)
+        for (int a = 0; a < group->rule.nodes; a++)
+            r->seen[place[l][a]] = r->seen[place[l][a]] ? 2 : 1;
 }
 
 /* At hanging nodes what those make of it that they lie amid: an average over the elements that have a hanging node
@@ -148,17 +153,20 @@ static void follow(uz_nodal_strains *out, const uz_mesh *mesh, const int64_t *he
 /* A triangle, tetrahedron or wedge that is alone at its nodes, with its material, differs from no mean: nothing shows
  * what it errs by. It is compared with what an element of one degree less has: quadratic ones with the mean of their
  * strain, linear ones with none. (Quadrilaterals and hexahedra have products of coordinates that no mean takes over.)
- * seen: room of one for each place. */
-static void lower_alone(uz_nodal_strains *out, unsigned char *seen, const uz_body_model *model,
+ * seen: of the recovery. */
+static void lower_alone(uz_nodal_strains *out, const unsigned char *seen, const uz_body_model *model,
                         const double *free_strain)
 {
     const uz_mesh *mesh = &model->mesh;
-    const int64_t *const of = out->of ? out->of : mesh->node, total = mesh->first[mesh->n_elements];
-    for (int64_t i = 0; i < total; i++)
-        seen[of[i]] = seen[of[i]] ? 2 : 1;
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+    const int64_t *const of = out->of ? out->of : mesh->node;
+    bool any = false;
+    for (int64_t i = 0; i < out->count && !any; i++)
+        any = seen[i] == 1;
+    for (int64_t e = 0; e < mesh->n_elements && any; e++) {
         const int64_t *place = of + mesh->first[e];
+        if (seen[place[0]] != 1)
+            continue;
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
         double mean[UZ_ELEMENT_STRESSES] = {0};
         bool alone = (1 << type->dim) != type->corners;
         for (int a = 0; a < type->nodes && alone; a++)
@@ -172,6 +180,18 @@ static void lower_alone(uz_nodal_strains *out, unsigned char *seen, const uz_bod
                 mean[c] += out->rows[place[a] * out->size + c] / type->corners;
         for (int a = 0; a < type->nodes; a++)
             memcpy(out->rows + place[a] * out->size, mean, (size_t)out->strains * sizeof *mean);
+    }
+}
+
+static void divide_by_volume(void *ctx, int64_t begin, int64_t end)
+{
+    const uz_nodal_strains *of = ctx;
+    for (int64_t i = begin; i < end; i++) {
+        double *row = of->rows + i * of->size, volume = row[of->strains];
+        const double scale = volume > 0 ? 1 / volume : 0;
+        for (int c = 0; c < of->size; c++)
+            row[c] *= scale;
+        row[of->strains] = volume;
     }
 }
 
@@ -212,15 +232,12 @@ uz_status uz_nodal_strains_recover(uz_nodal_strains *out, const uz_strain_source
     r->out = out;
     r->model = model;
     r->how = how;
+    r->seen = seen;
     const uz_strain_work work = {make_rule, add_group, r};
     const uz_status status = uz_strain_groups(&work, from, hooks, err);
     free(r);
-    for (int64_t i = 0; status == UZ_OK && i < out->count; i++) {
-        double *row = out->rows + i * out->size;
-        const double scale = row[out->strains] > 0 ? 1 / row[out->strains] : 0;
-        for (int c = 0; c < out->size; c++)
-            row[c] *= c == out->strains ? 1 : scale;
-    }
+    if (status == UZ_OK)
+        uz_by_pieces(divide_by_volume, out, out->count);
     if (status == UZ_OK && seen && mesh->n_elements > 0)
         lower_alone(out, seen, model, from->free_strain);
     if (status == UZ_OK && mesh->hangs)

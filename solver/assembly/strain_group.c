@@ -14,6 +14,9 @@ enum { LANES = UZ_STRAIN_LANES };
 UZ_INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
 {
     const uz_lame **lame = g->lame;
+    if (g->alike && !from->free_strain)
+        return;
+    g->alike = !from->model->material_of;
     g->general = false;
     for (int l = 0; l < LANES; l++) {
         lame[l] = &uz_element_material(from->model, g->element[l])->lame;
@@ -30,14 +33,21 @@ UZ_INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
     }
 }
 
-/* Values (n_nodes x dim) at the nodes of the elements. */
+typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
+
+/* Values (n_nodes x dim) at the nodes of the elements: two of a node at once, then those of the elements side by side.
+ */
 UZ_INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value, int dim)
 {
     for (int a = 0; a < g->rule.nodes; a++) {
         const double *const at[LANES] = {value + g->node[0][a] * dim, value + g->node[1][a] * dim,
                                          value + g->node[2][a] * dim, value + g->node[3][a] * dim};
-        for (int c = 0; c < dim; c++)
-            *out++ = (uz_lanes){at[0][c], at[1][c], at[2][c], at[3][c]};
+        const uz_lanes even = __builtin_shufflevector(*(const two *)at[0], *(const two *)at[2], 0, 1, 2, 3),
+                       odd = __builtin_shufflevector(*(const two *)at[1], *(const two *)at[3], 0, 1, 2, 3);
+        *out++ = __builtin_shufflevector(even, odd, 0, 4, 2, 6);
+        *out++ = __builtin_shufflevector(even, odd, 1, 5, 3, 7);
+        if (dim == 3)
+            *out++ = (uz_lanes){at[0][2], at[1][2], at[2][2], at[3][2]};
     }
 }
 
@@ -120,13 +130,16 @@ UZ_INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
             gather(g->x, g, mesh->xyz, dim);
         for (int i = 0; equal && i < g->rule.nodes * dim; i++)
             g->x[i] = xyz[i] - (uz_lanes){0};
-        uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
+        if (!g->rule.simplex || from->large)
+            uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }
     if (from->unrotated && from->model->kind != UZ_AXISYMMETRIC)
         take_unrotated(g, dim);
     if (from->large)
         uz_lane_green_strains(g->strain, &g->rule, &g->shape, g->u, from->by_volume);
+    else if (g->rule.simplex)
+        uz_lane_simplex(&g->shape, g->strain[0], &g->rule, g->x, g->u, from->model->thickness);
     else if (!g->general || g->rule.formulation != UZ_FORMULATION_INCOMPATIBLE)
         uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
     else
@@ -190,7 +203,7 @@ uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *f
                     memset(g, 0, sizeof *g);
                 work->rule(work->ctx, &g->rule, kind, formulation);
                 g->begun = true;
-                g->shaped = false;
+                g->shaped = g->alike = false;
             }
         }
         g->element[g->count++] = e;

@@ -10,6 +10,7 @@
 typedef struct {
     bool begun;  /* rule is made: of one formulation, as materials may differ in it */
     bool shaped; /* shape is that of all elements of the mesh */
+    bool alike;  /* and so is their material */
     int count;
     int64_t element[UZ_STRAIN_LANES];
     const int64_t *node[UZ_STRAIN_LANES]; /* of each element */

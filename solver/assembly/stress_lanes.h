@@ -12,7 +12,7 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
                         const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES]);
 /* Integrals over elements. */
 typedef struct {
-    uz_lanes times;  /* given for each group: what of eta2 counts, of each lane's element */
+    bool hidden;     /* given: eta2 has also what is hidden in the difference (uz_whole_difference) */
     double eta2;     /* of (s* - s)' C^-1 (s* - s) */
     double stress;   /* of strain' C strain, of the strain that makes stress */
     double whole;    /* the same of all of the strain */

@@ -44,6 +44,8 @@ void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
         volume += gauss->point[g].weight;
     for (int k = 0; k < count; k++)
         add_point(rule, point[k], weight ? weight[k] : volume / count);
+    rule->simplex = type->jacobian == UZ_JACOBIAN_CONSTANT && rule->asked == 1 && model != UZ_AXISYMMETRIC &&
+                    formulation == UZ_FORMULATION_STANDARD;
     if (count > 0 && formulation == UZ_FORMULATION_STANDARD)
         return;
     for (int g = 0; g < gauss->count; g++)
@@ -239,6 +241,29 @@ UZ_INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strai
         take_mean_dilatation(strain, rule, shape);
 }
 
+/* Derivatives by the reference coordinates are differences between nodes. */
+UZ_INLINE void simplex_of(uz_lane_shape *shape, uz_lanes *strain, const uz_strain_rule *rule, const uz_lanes *x,
+                          const uz_lanes *u, double thickness, int dim)
+{
+    uz_lanes X[3][3], D[3][3], inverse[3][3], H[3][3], det;
+    for (int c = 0; c < dim; c++)
+        for (int i = 0; i < dim; i++) {
+            X[c][i] = x[(i + 1) * dim + c] - x[c];
+            D[c][i] = u[(i + 1) * dim + c] - u[c];
+        }
+    uz_lane_invert(inverse, &det, X, dim);
+    for (int c = 0; c < dim; c++)
+        for (int j = 0; j < dim; j++) {
+            shape->inverse[0][c][j] = inverse[c][j];
+            H[c][j] = D[c][0] * inverse[j][0];
+            for (int i = 1; i < dim; i++)
+                H[c][j] += D[c][i] * inverse[j][i];
+        }
+    shape->det[0] = det;
+    shape->volume[0] = (dim == 3 ? rule->weight[0] : rule->weight[0] * thickness) * det;
+    strain_of_gradient(strain, H, rule, shape, u, 0, dim);
+}
+
 UZ_INLINE void gradients_of(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
                             const uz_lanes *u, int dim)
 {
@@ -352,6 +377,10 @@ FOR_ALL(uz_lane_strains, strains_of,
         (uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
          const uz_lane_material *material, const uz_lanes *u),
         strain, rule, shape, material, u)
+FOR_ALL(uz_lane_simplex, simplex_of,
+        (uz_lane_shape * shape, uz_lanes strain[UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lanes *x,
+         const uz_lanes *u, double thickness),
+        shape, strain, rule, x, u, thickness)
 FOR_ALL(uz_lane_green_strains, green_strains_of,
         (uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
          const uz_lanes *u, bool by_volume),

@@ -20,6 +20,7 @@ typedef struct {
     int asked;    /* points that were asked for: the first ones */
     int averaged; /* averages over the element are over the points from this one on */
     int direct;   /* of the stresses, which come first: those that are no shear */
+    bool simplex; /* linear, at one point, and no ring: all of it has the same strain */
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
     double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES], slope[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES][3];
     double centre[UZ_ELEMENT_NODES][3]; /* slope at the origin */
@@ -49,6 +50,10 @@ typedef struct {
 /* strain[point][component] of the displacements u (nodes x dim); of a material only incompatible modes want to know. */
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
+
+/* Of a rule with `simplex` both at once: the shape that uz_lane_shape_of gives, and the strain. */
+void uz_lane_simplex(uz_lane_shape *shape, uz_lanes strain[UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                     const uz_lanes *x, const uz_lanes *u, double thickness);
 
 /* Those of Green and Lagrange, (H + H' + H'H) / 2 with shears 2 E_xy, for large deformation: without incompatible
  * modes; of mean dilatation those of F whose determinant is its mean (finite/mean_dilatation.h). by_volume: with ln J,

@@ -34,7 +34,7 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->body = body;
     out->u = u;
     out->volume = 0;
-    out->group.begun = out->group.shaped = false;
+    out->group.begun = out->group.shaped = out->group.alike = false;
     out->group.count = 0;
 }
 
@@ -78,7 +78,7 @@ void uz_field_points_states(uz_field_state *state, uz_field_points *points, int6
             uz_strain_rule_at(&group->rule, (uz_element_kind)mesh->kind[element], model->kind, formulation,
                               (const double(*)[3])points->point, NULL, points->count);
             group->begun = true;
-            group->shaped = false;
+            group->shaped = group->alike = false;
         }
         group->count = 0;
         int64_t e = element;
