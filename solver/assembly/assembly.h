@@ -308,17 +308,26 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
 /* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err);
 
+/* What the estimate of the mesh's error sees of an answer on its way. */
+typedef struct {
+    double share; /* norm of the strain that has stress over ||u_h||_E, 1 without temperature */
+    /* NaN where it did not look, or: */
+    double twice;  /* u'K u without springs, as of uz_strain_energy; of linear simplices alone, NaN where there are
+                      others */
+    double steep2; /* the square of the largest slope of u from an element's first node to another one of its own */
+} uz_mesh_look;
+
 /* Estimated ||u - u_h||_E / ||u||_E of the mesh, for nodal displacements n_nodes x dim; NaN when there is no memory,
  * INFINITY where energies are beyond the range of double. Zienkiewicz and Zhu, "A simple error estimator and adaptive
  * procedure for practical engineering analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared
  * with its own nodal averages. The strain of the temperatures among the scene's loads (scene NULL: none) has no stress,
  * and the error is relative to the norm of the strain that has: free expansion would hide it. Both norms have what
- * springs store, and the error what they do at nodes other than along sides. *share (may be NULL): that norm over
- * ||u_h||_E, 1 without temperature. A body that is carried along or expands freely has no error. eta2
- * (n_elements, NULL: not wanted): what each element has of the square of the error, not relative; all 0 where the error
- * is. With a scene, thin stacks of elements with incompatible modes from one known load to another one are off by no
- * less than the mean stress between both differs by from them (thin_elements.h). */
-double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+ * springs store, and the error what they do at nodes other than along sides. *look may be NULL. A body that is carried
+ * along or expands freely has no error. eta2 (n_elements, NULL: not wanted): what each element has of the square of the
+ * error, not relative; all 0 where the error is. With a scene, thin stacks of elements with incompatible modes from one
+ * known load to another one are off by no less than the mean stress between both differs by from them
+ * (thin_elements.h). */
+double uz_estimate_mesh_error(double *eta2, uz_mesh_look *look, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal);
 
 /* What springs at nodes, as the mesh has them, do on u along z (n_nodes x dim each), less what those do that are spread

@@ -277,12 +277,12 @@ static bool nothing_strains(const uz_body_model *model, const uz_scene *scene, c
            (translated || is_carried(model, nodal, alone ? CARRIED : ROUNDED));
 }
 
-double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *model, const uz_scene *scene,
+double uz_estimate_mesh_error(double *eta2, uz_mesh_look *look, const uz_body_model *model, const uz_scene *scene,
                               const double *nodal)
 {
     double *free_strain = NULL;
-    if (share)
-        *share = 1;
+    if (look)
+        *look = (uz_mesh_look){1, NAN, NAN};
     if (eta2)
         memset(eta2, 0, (size_t)model->mesh.n_elements * sizeof *eta2);
     if (scene && uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
@@ -296,7 +296,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         own = uz_alloc_zero(model->mesh.n_elements, sizeof *own);
         status = own ? UZ_OK : UZ_ERR_MEMORY;
     }
-    uz_stress_sums sums = {.hidden = true, .eta2_of = eta2 ? eta2 : own};
+    uz_stress_sums sums = {.hidden = true, .steepness = look != NULL, .eta2_of = eta2 ? eta2 : own};
     if (status == UZ_OK)
         status = integrate(&sums, &from, NULL);
     for (int64_t e = 0; e < model->mesh.n_elements && least && status == UZ_OK; e++) {
@@ -306,6 +306,12 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
     uz_free_all(least, own, free_strain);
     if (status != UZ_OK)
         return NAN;
+    if (look) {
+        look->twice = sums.others ? NAN : sums.whole;
+        look->steep2 = 0;
+        for (int l = 0; l < UZ_STRAIN_LANES; l++)
+            look->steep2 = fmax(look->steep2, sums.steep2[l]);
+    }
     double stored;
     const double springs = uz_spring_error(eta2, &stored, model, scene, nodal, sums.whole);
     if (isnan(springs))
@@ -320,7 +326,7 @@ double uz_estimate_mesh_error(double *eta2, double *share, const uz_body_model *
         return 0;
     if (is_translation(model, nodal, ALIKE)) /* nor is what rounding left of strains known */
         sums.eta2 += energy_of_rounding(model, nodal);
-    if (share)
-        *share = stressed;
+    if (look)
+        look->share = stressed;
     return sqrt(sums.eta2 / (sums.stress + sums.eta2));
 }

@@ -245,6 +245,22 @@ UZ_INLINE void add_energies(uz_lanes energy[2], const uz_strain_group *g, int p,
     }
 }
 
+/* Displacements and places against those of the first node. */
+UZ_INLINE void find_steepest(uz_lanes *steep2, const uz_strain_group *g, int nodes, int dim)
+{
+    for (int a = 1; a < nodes; a++) {
+        uz_lanes u2 = {0}, x2 = {0};
+        for (int c = 0; c < dim; c++) {
+            const uz_lanes u = g->u[a * dim + c] - g->u[c], x = g->x[a * dim + c] - g->x[c];
+            u2 += u * u;
+            x2 += x * x;
+        }
+        const uz_lanes slope2 = u2 / x2;
+        const lane_bits more = (lane_bits)(slope2 > *steep2);
+        *steep2 = (uz_lanes)((more & (lane_bits)slope2) | (~more & (lane_bits)*steep2));
+    }
+}
+
 /* The difference is linear: with d_a at the nodes of a simplex of volume V in k dimensions, its integral is
  * V / ((k + 1) (k + 2)) times the sum of those of d_a and of that of the sum of d_a. */
 UZ_INLINE void compare_simplex(uz_lanes *eta, uz_lanes energy[2], uz_lanes nodal[NODES][MOST_ROW],
@@ -299,6 +315,8 @@ UZ_INLINE void compare(uz_stress_sums *sums, const double *rows, const uz_strain
         compare_simplex(&eta, energy, nodal, g, &per_bulk, &per_twice_mu, n, direct, size);
     else
         compare_points(&eta, energy, nodal, g, &per_bulk, &per_twice_mu, n, direct, size);
+    if (sums->steepness)
+        find_steepest(&sums->steep2, g, nodes, n == 6 ? 3 : 2);
     if (sums->hidden) {
         uz_lanes times, around[NODES];
         for (int a = 0; a < nodes; a++)
@@ -359,6 +377,8 @@ static void compare_each(uz_stress_sums *sums, const double *rows, const uz_stra
     uz_lanes times = (uz_lanes){0} + 1;
     if (sums->hidden)
         find_whole_of_rows(&times, rows, size, g, place);
+    if (sums->steepness)
+        find_steepest(&sums->steep2, g, g->rule.nodes, g->rule.dim);
     for (int l = 0; l < g->count; l++) {
         double eta = 0, energy[2] = {0};
         double thermal[UZ_ELEMENT_STRESSES];
@@ -428,6 +448,7 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
 void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES])
 {
+    sums->others = sums->others || !group->rule.simplex;
     if (group->general)
         compare_each(sums, rows, group, place, size);
     else

@@ -13,10 +13,13 @@ void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
 /* Integrals over elements. */
 typedef struct {
     bool hidden;     /* given: eta2 has also what is hidden in the difference (uz_whole_difference) */
+    bool steepness;  /* given: steep2 is wanted */
     double eta2;     /* of (s* - s)' C^-1 (s* - s) */
     double stress;   /* of strain' C strain, of the strain that makes stress */
     double whole;    /* the same of all of the strain */
     double *eta2_of; /* NULL, or eta2 of each element */
+    bool others;     /* than linear simplices were among the elements */
+    uz_lanes steep2; /* largest square of a slope of the displacements from an element's first node to others of it */
 } uz_stress_sums;
 /* rows: stresses s*. */
 void uz_stress_rows_compare(uz_stress_sums *sums, const double *rows, int size, const uz_strain_group *group,

@@ -13,13 +13,14 @@ struct uz_ahead {
     const uz_body_model *model;
     uz_scene scene;
     double *nodal;
-    double error, share;
+    double error;
+    uz_mesh_look look;
 };
 
 static void estimate(void *ctx)
 {
     uz_ahead *ahead = ctx;
-    ahead->error = uz_estimate_mesh_error(NULL, &ahead->share, ahead->model, &ahead->scene, ahead->nodal);
+    ahead->error = uz_estimate_mesh_error(NULL, &ahead->look, ahead->model, &ahead->scene, ahead->nodal);
 }
 
 uz_ahead *uz_ahead_start(const uz_body_model *model, const uz_scene *scene, const double *u, const double *prescribed)
@@ -42,7 +43,7 @@ uz_ahead *uz_ahead_start(const uz_body_model *model, const uz_scene *scene, cons
     return NULL;
 }
 
-bool uz_ahead_take(uz_ahead *ahead, double *error, double *share, const double *nodal)
+bool uz_ahead_take(uz_ahead *ahead, double *error, uz_mesh_look *look, const double *nodal)
 {
     if (!ahead || !uz_aside_finish(&ahead->task) || isnan(ahead->error))
         return false;
@@ -50,7 +51,7 @@ bool uz_ahead_take(uz_ahead *ahead, double *error, double *share, const double *
     if (memcmp(ahead->nodal, nodal, (size_t)(mesh->n_nodes * mesh->dim) * sizeof *nodal) != 0)
         return false;
     *error = ahead->error;
-    *share = ahead->share;
+    *look = ahead->look;
     return true;
 }
 

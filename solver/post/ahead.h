@@ -11,7 +11,7 @@ typedef struct uz_ahead uz_ahead;
  * outlive it. NULL: it is not done ahead, as nobody has time for it, the mesh is small or memory is short. */
 uz_ahead *uz_ahead_start(const uz_body_model *model, const uz_scene *scene, const double *u, const double *prescribed);
 /* What uz_estimate_mesh_error says of the displacements `nodal`. False: it was of others, or was not computed. */
-bool uz_ahead_take(uz_ahead *ahead, double *error, double *share, const double *nodal);
+bool uz_ahead_take(uz_ahead *ahead, double *error, uz_mesh_look *look, const double *nodal);
 /* Waits where it runs; NULL is fine. */
 void uz_ahead_free(uz_ahead *ahead);
 

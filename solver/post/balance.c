@@ -357,12 +357,25 @@ static double count_carried(void *ctx, int64_t begin, int64_t end)
     return (double)count;
 }
 
-static uz_status energy_of(double *energy, balance *b, uz_error *err)
+static double spring_energy(const balance *b)
+{
+    const uz_body_model *model = b->model;
+    double energy = 0;
+    for (int64_t i = 0; i < model->mesh.n_nodes * b->dim && model->spring; i++)
+        energy += 0.5 * model->spring[i] * b->u[i] * b->u[i];
+    return energy;
+}
+
+/* twice: as of uz_balance_forces. */
+static uz_status energy_of(double *energy, balance *b, double twice, uz_error *err)
 {
     /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
     const uz_body_model *model = b->model;
     const bool carried = model->n_modes > 0 || uz_sum_by_pieces(count_carried, b, model->mesh.n_nodes * b->dim) > 0;
-    return uz_strain_energy(energy, model, b->u, carried, err);
+    if (carried || isnan(twice))
+        return uz_strain_energy(energy, model, b->u, carried, err);
+    *energy = 0.5 * twice + spring_energy(b);
+    return UZ_OK;
 }
 
 /* How rigid groups have moved, linearly or (large) as they are turned, and the moments about their points there. */
@@ -400,7 +413,7 @@ static bool make_room(balance *b, int64_t n)
 }
 
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *r, const uz_balance_known *known, uz_error *err)
+                            const double *r, const uz_balance_known *known, double twice, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
     balance b = {.model = model,
@@ -465,9 +478,8 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
     if (known)
         energy = known->energy;
     else if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the body */
-        status = energy_of(&energy, &b, err);
-    for (int64_t i = 0; i < n * dim && model->spring; i++)
-        out->spring_energy += 0.5 * model->spring[i] * u[i] * u[i];
+        status = energy_of(&energy, &b, twice, err);
+    out->spring_energy = spring_energy(&b);
     double stored;
     if (status == UZ_OK)
         out->spring_error = uz_spring_error(NULL, &stored, model, scene, u, 2 * (energy - out->spring_energy));

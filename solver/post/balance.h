@@ -16,9 +16,10 @@ typedef struct {
 } uz_balance_known;
 
 /* Fills out->contacts, supports, loads, loads_size, imbalance and both energies; the names and zeros are there.
- * u: n_nodes x dim; r: m; scene: with the loads of the case; known: NULL: all follows from the stiffness. */
+ * u: n_nodes x dim; r: m; scene: with the loads of the case; known: NULL: all follows from the stiffness; twice: u'K u
+ * of the elements as of uz_mesh_look, NaN: it is to be computed. */
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                            const double *r, const uz_balance_known *known, uz_error *err);
+                            const double *r, const uz_balance_known *known, double twice, uz_error *err);
 
 /* Contact with a rigid obstacle that is narrower than the mesh can tell (coarse.c), of the scene's contacts the worst.
  */
@@ -38,9 +39,9 @@ double uz_pressed_apart(int64_t *row, const uz_body_model *model, const uz_overl
 #define UZ_WARN_APART "pressed_apart"
 
 /* Adds to the warnings of result->evaluation what makes the answer doubtful. Reads its overlap and approach, and the
- * summary's geometry.sliding and discretization_error. coarse: of the answer. */
+ * summary's geometry.sliding and discretization_error. coarse, look: of the answer. */
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene,
-                         const uz_coarse_contact *coarse, uz_error *err);
+                         const uz_coarse_contact *coarse, const uz_mesh_look *look, uz_error *err);
 /* Those of them that are about the mesh alone, of an answer of large deformation. */
 void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene *scene);
 /* Warns where bodies of large deformation pass through each other, or themselves, under this part of the load. */

@@ -146,15 +146,22 @@ static void look_at_surfaces(void *ctx)
         x->status = uz_find_coarse_contact(&x->coarse, x->model, x->scene, of->u, of->r, &x->err);
 }
 
-/* What acts on the body, and beside it how deep surfaces stand in each other, and where contact is narrow. */
-static uz_status look_at_answer(uz_coarse_contact *coarse, uz_result *result, const uz_body_model *model,
-                                const uz_scene *scene, uz_error *err)
+/* What the mesh has missed, with what is seen in passing, and what acts on the body; beside it how deep surfaces stand
+ * in each other, and where contact is narrow. */
+static uz_status look_at_answer(uz_coarse_contact *coarse, uz_mesh_look *look, uz_result *result,
+                                const uz_body_model *model, const uz_scene *scene, uz_ahead *ahead, uz_error *err)
 {
     enum { LEAST = 1000 }; /* rows; with fewer it takes less than a thread does to wake up */
+    uz_summary *summary = &result->summary;
     surface_work x = {.result = result, .model = model, .scene = scene};
+    const bool told = uz_ahead_take(ahead, &summary->discretization_error, look, result->u);
     x.task = (uz_aside_task){.run = look_at_surfaces, .ctx = &x};
     const bool aside = model->m >= LEAST && uz_aside_start(&x.task);
-    const uz_status status = uz_balance_forces(result->evaluation, model, scene, result->u, result->r, NULL, err);
+    if (!told)
+        summary->discretization_error = uz_estimate_mesh_error(NULL, look, model, scene, result->u);
+    summary->stress_share = look->share;
+    const uz_status status =
+        uz_balance_forces(result->evaluation, model, scene, result->u, result->r, NULL, look->twice, err);
     if (!aside || !uz_aside_finish(&x.task))
         look_at_surfaces(&x);
     *coarse = x.coarse;
@@ -175,6 +182,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
 {
     uz_summary *summary = &result->summary;
     uz_coarse_contact coarse;
+    uz_mesh_look look;
     double pressed;
     uz_status status = begin(result, model, scene, err);
     uz_evaluation *e = result->evaluation;
@@ -183,11 +191,9 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status == UZ_OK)
         status = sum_contact(&pressed, result, model, NULL, err);
     if (status == UZ_OK)
-        status = look_at_answer(&coarse, result, model, scene, err);
+        status = look_at_answer(&coarse, &look, result, model, scene, ahead, err);
     if (status != UZ_OK)
         return status;
-    if (!uz_ahead_take(ahead, &summary->discretization_error, &summary->stress_share, result->u))
-        summary->discretization_error = uz_estimate_mesh_error(NULL, &summary->stress_share, model, scene, result->u);
     if (isnan(summary->discretization_error) && !result->ray)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     if (is_rounding(e, &summary->certificate))
@@ -196,7 +202,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
     if (status == UZ_OK)
         status = uz_find_peak_stress(e, model, scene, result->u, err);
-    return status == UZ_OK ? uz_find_doubts(result, model, scene, &coarse, err) : status;
+    return status == UZ_OK ? uz_find_doubts(result, model, scene, &coarse, &look, err) : status;
 }
 
 /* ---- finite kinematics */
@@ -271,7 +277,7 @@ uz_status uz_evaluate_finite(uz_result *result, const uz_body_model *model, cons
         status = sum_contact(&pressed, result, model, result->u, err);
     if (status == UZ_OK)
         status = uz_balance_forces(result->evaluation, &displaced, scene, result->u, result->r,
-                                   &(uz_balance_known){inner, load, energy, model}, err);
+                                   &(uz_balance_known){inner, load, energy, model}, NAN, err);
     if (status == UZ_OK)
         status = uz_measure_overlap(result->evaluation->overlap, model, scene, result->u, err);
     if (status == UZ_OK)

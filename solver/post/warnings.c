@@ -56,7 +56,7 @@ typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
     const double *u, *r;
-    double sliding, mesh_error;
+    double sliding, mesh_error, steep2; /* steep2: of uz_mesh_look, NaN where it did not look */
     uz_evaluation *out;
 } doubts;
 
@@ -117,6 +117,8 @@ static bool is_steep(const doubts *d, double slope)
     const int dim = mesh->dim;
     const double *u = d->u;
     double range2 = 0, shortest = INFINITY;
+    if (!isnan(d->steep2))
+        return d->steep2 > slope * slope;
     for (int c = 0; c < dim && mesh->uniform; c++) {
         double least = u[c], most = u[c];
         for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
@@ -350,7 +352,7 @@ static double stress_error(const uz_field_body *body, const double *u, const dou
 void uz_doubt_strain(uz_evaluation *out, const uz_small *small, const uz_body_model *model, const uz_scene *finite,
                      const double *u, const double *at_large)
 {
-    const doubts d = {.model = model, .scene = finite, .u = u, .out = out};
+    const doubts d = {.model = model, .scene = finite, .u = u, .steep2 = NAN, .out = out};
     elements_look look;
     look_at_elements(&look, &d);
     const int64_t e = look.strain.element;
@@ -788,6 +790,7 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
                       .u = result->u,
                       .r = result->r,
                       .mesh_error = result->summary.discretization_error,
+                      .steep2 = NAN,
                       .out = result->evaluation};
     look_at_stabilizer(&d);
     look_at_mesh(&d);
@@ -795,18 +798,24 @@ void uz_doubt_mesh(uz_result *result, const uz_body_model *model, const uz_scene
 
 void uz_drop_sliding(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene)
 {
-    const doubts d = {.model = model, .scene = scene, .out = out};
+    const doubts d = {.model = model, .scene = scene, .steep2 = NAN, .out = out};
     const bool dropped = drop(out, UZ_WARN_SLIDING);
     for (int64_t k = 0; k < scene->n_contacts && dropped; k++)
         look_at_overlap(&d, k);
 }
 
 uz_status uz_find_doubts(uz_result *result, const uz_body_model *model, const uz_scene *scene,
-                         const uz_coarse_contact *coarse, uz_error *err)
+                         const uz_coarse_contact *coarse, const uz_mesh_look *look, uz_error *err)
 {
     const uz_summary *s = &result->summary;
-    const doubts d = {
-        model, scene, result->u, result->r, s->geometry.sliding, s->discretization_error, result->evaluation};
+    const doubts d = {.model = model,
+                      .scene = scene,
+                      .u = result->u,
+                      .r = result->r,
+                      .sliding = s->geometry.sliding,
+                      .mesh_error = s->discretization_error,
+                      .steep2 = look->steep2,
+                      .out = result->evaluation};
     look_at_apart(&d, result->g); /* first: the outcome goes by it, and there is room for so many warnings alone */
     if (is_steep(&d, STEEP))
         doubt_elements(&d);

@@ -128,17 +128,18 @@ uz_status uz_balance_request(double *requested, const uz_body_model *model, cons
 {
     const int64_t count = model->mesh.n_nodes * model->mesh.dim;
     double *nodal = uz_alloc(count, sizeof *nodal);
-    double share, mesh = NAN;
+    double mesh = NAN;
+    uz_mesh_look look;
     if (nodal) {
         uz_recover_nodal(nodal, model, u, prescribed);
         for (int64_t i = 0; exponent != 0 && i < count; i++)
             nodal[i] = ldexp(nodal[i], -exponent);
-        mesh = uz_estimate_mesh_error(NULL, &share, model, scene, nodal);
+        mesh = uz_estimate_mesh_error(NULL, &look, model, scene, nodal);
     }
     free(nodal);
     if (isnan(mesh))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to look at what the mesh loses");
     if (mesh > 0.0 && isfinite(mesh))
-        *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * mesh * share));
+        *requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * mesh * look.share));
     return UZ_OK;
 }

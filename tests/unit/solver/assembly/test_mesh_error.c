@@ -303,6 +303,8 @@ static double complementary(uz_model model, uz_lame lame, const double *stress)
 {
     const int n = uz_stress_count(model), direct = n == 3 ? 2 : 3;
     double trace = 0, deviator = 0;
+    if (lame.general)
+        return uz_stress_work(model, lame, stress);
     for (int i = 0; i < direct; i++)
         trace += stress[i];
     for (int i = 0; i < direct; i++)
@@ -396,18 +398,52 @@ static double plain_estimate(double *share, const uz_body_model *model, const uz
     return sqrt(x.eta2 / (x.stress2 + x.eta2));
 }
 
+/* What the estimate sees beside it: the energy of linear simplices, and how steep displacements are. */
+static void check_look(const uz_mesh_look *look, const uz_body_model *model, const double *u, const char *what)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    double energy, springs = 0, steep2 = 0;
+    bool simplices = model->kind != UZ_AXISYMMETRIC;
+    CHECK_INT(uz_strain_energy(&energy, model, u, false, NULL), UZ_OK);
+    for (int64_t i = 0; i < mesh->n_nodes * dim && model->spring; i++)
+        springs += 0.5 * model->spring[i] * u[i] * u[i];
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        simplices = simplices && count == dim + 1;
+        for (int a = 1; a < count; a++) {
+            double u2 = 0, x2 = 0;
+            for (int c = 0; c < dim; c++) {
+                u2 += pow(u[node[a] * dim + c] - u[node[0] * dim + c], 2);
+                x2 += pow(mesh->xyz[node[a] * dim + c] - mesh->xyz[node[0] * dim + c], 2);
+            }
+            steep2 = fmax(steep2, u2 / x2);
+        }
+    }
+    CHECK_MSG(fabs(look->steep2 - steep2) <= 1e-12 * steep2, "%s: slopes of %.17g, not %.17g", what, look->steep2,
+              steep2);
+    if (simplices)
+        CHECK_MSG(fabs(look->twice / 2 + springs - energy) <= 1e-12 * energy, "%s: an energy of %.17g, not %.17g", what,
+                  look->twice / 2 + springs, energy);
+    else
+        CHECK_MSG(isnan(look->twice), "%s: an energy of %.17g", what, look->twice);
+}
+
 static void compare_estimates(const uz_body_model *model, const uz_scene *scene, qp_random *rng, const char *what)
 {
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;
     double *u = body_room(n, sizeof *u);
     for (int64_t i = 0; i < n; i++)
         u[i] = 1e-3 * (model->mesh.xyz[i] + 0.3 * random_signed(rng));
-    double want_share, share;
+    double want_share;
+    uz_mesh_look look;
     const double want = plain_estimate(&want_share, model, scene, u);
-    const double got = uz_estimate_mesh_error(NULL, &share, model, scene, u);
+    const double got = uz_estimate_mesh_error(NULL, &look, model, scene, u);
     CHECK_MSG(fabs(got - want) <= 1e-11 * want + 1e-14, "%s: %.17g, not %.17g", what, got, want);
-    CHECK_MSG(fabs(share - want_share) <= 1e-11 * want_share, "%s: a share of %.17g, not %.17g", what, share,
+    CHECK_MSG(fabs(look.share - want_share) <= 1e-11 * want_share, "%s: a share of %.17g, not %.17g", what, look.share,
               want_share);
+    check_look(&look, model, u, what);
     free(u);
 }
 
@@ -482,6 +518,33 @@ TEST(estimate_of_boxes_is_that_of_single_elements)
             uz_body_model outline = body_model(&s);
             compare_estimates(&outline, &s, &rng, name);
             mix_materials(&outline, &rng);
+            compare_estimates(&outline, &s, &rng, name);
+            uz_body_model_clear(&outline);
+            uz_scene_clear(&s);
+        }
+}
+
+/* Of a material with directions elements are looked at one after the other. */
+TEST(estimate_of_fibres_is_that_of_single_elements)
+{
+    static const uz_orthotropic FIBRES = {.young = {130e3, 9e3, 8e3},
+                                          .poisson = {0.3, 0.4, 0.25},
+                                          .shear = {5e3, 3e3, 4e3},
+                                          .expansion = {1e-6, 3e-5, 2e-5}};
+    qp_random rng = {11};
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
+        for (int way = 0; way < 6; way++) {
+            const char *name = uz_element_name((uz_element_kind)k);
+            const uz_model model = MODELS[uz_element_type_of((uz_element_kind)k)->dim == 3][way % 3];
+            uz_scene s = body_scene(model, name, (double[3]){5, 3, 2}, (int64_t[3]){3, 2, 2});
+            s.formulation = k == UZ_QUAD4 || k == UZ_HEX8 ? UZ_FORMULATION_BBAR : UZ_FORMULATION_AUTO;
+            s.materials[0].is_orthotropic = true;
+            s.materials[0].orthotropic = FIBRES;
+            body_hold(&s, "top", 0, 0, 0);
+            body_load(&s, UZ_LOAD_TEMPERATURE, "all", 30, 0, 0);
+            s.n_loads = way % 2;
+            uz_body_model outline = body_model(&s);
+            CHECK(outline.materials[0].lame.general);
             compare_estimates(&outline, &s, &rng, name);
             uz_body_model_clear(&outline);
             uz_scene_clear(&s);

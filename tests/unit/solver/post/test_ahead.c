@@ -15,7 +15,8 @@ TEST(the_estimate_ahead_is_the_estimate)
     const int64_t n = model.mesh.n_nodes * 2;
     double *u = body_room(model.d, sizeof *u), *nodal = body_room(n, sizeof *nodal);
     double *prescribed = body_room(model.n_fixed, sizeof *prescribed);
-    double error = NAN, share = NAN, expected_share = NAN;
+    double error = NAN;
+    uz_mesh_look look = {NAN, NAN, NAN}, expected_look;
     bool taken = false;
     CHECK_INT(uz_aside_begin(2), 2);
     for (int tries = 0; tries < 10000 && !taken; tries++) { /* a task may be taken back before it is begun */
@@ -29,14 +30,15 @@ TEST(the_estimate_ahead_is_the_estimate)
         CHECK(ahead);
         memset(u, 0, (size_t)model.d * sizeof *u); /* it has a copy */
         sched_yield();
-        taken = uz_ahead_take(ahead, &error, &share, nodal);
+        taken = uz_ahead_take(ahead, &error, &look, nodal);
         nodal[n / 2] += 1;
-        CHECK(!uz_ahead_take(ahead, &error, &share, nodal)); /* of another answer */
+        CHECK(!uz_ahead_take(ahead, &error, &look, nodal)); /* of another answer */
         nodal[n / 2] -= 1;
         uz_ahead_free(ahead);
     }
-    const double expected = uz_estimate_mesh_error(NULL, &expected_share, &model, &s, nodal);
-    CHECK(taken && error == expected && share == expected_share && expected > 0);
+    const double expected = uz_estimate_mesh_error(NULL, &expected_look, &model, &s, nodal);
+    CHECK(taken && error == expected && look.share == expected_look.share && expected > 0);
+    CHECK(look.steep2 == expected_look.steep2 && look.steep2 > 0);
     uz_aside_allow(1);
     free(prescribed);
     free(nodal);
