@@ -153,8 +153,10 @@ UZ_INLINE void take_own_part(uz_lanes *times, const uz_strain_group *g, const uz
         left += (uz_lanes)((lane_bits)others & (lane_bits)(others > 0));
     }
     left /= nodes;
-    for (int l = 0; l < LANES; l++) /* else it is compared with none of its own (nodal_strains.c) */
-        (*times)[l] = left[l] <= ALONE ? 1 : 1 / (left[l] > LEAST_LEFT ? left[l] : LEAST_LEFT);
+    const uz_lanes one = 1 + (uz_lanes){0}, least = LEAST_LEFT + (uz_lanes){0};
+    const lane_bits some = (lane_bits)(left > ALONE), /* else it is compared with none of its own (nodal_strains.c) */
+        less = some & (lane_bits)(left < LEAST_LEFT);
+    *times /= (uz_lanes)((~some & (lane_bits)one) | (less & (lane_bits)least) | (some & ~less & (lane_bits)left));
 }
 
 /* around: the volumes at the nodes. */
