@@ -1,6 +1,7 @@
 #include "scene/corner_table.h"
 
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 #include "linalg/pieces.h"
 
@@ -8,63 +9,102 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An item of a bucket while it is sorted: the corners after the lowest one, ascending, -1 beyond them. */
-typedef struct {
-    int64_t corner[UZ_MOST_CORNERS - 1], item;
-} sort_entry;
+/* The corners of an item that are sorted as numbers of 32 bits (nodes are fewer: UZ_SCENE_MAX_DOFS), counted from 1 on,
+ * 0 beyond them: two to a word. */
+typedef uint32_t corner_number;
 
-static void sort_nodes(int64_t *node, int count)
-{
-    for (int i = 1; i < count; i++) {
-        const int64_t moved = node[i];
-        int j = i;
-        for (; j > 0 && node[j - 1] > moved; j--)
-            node[j] = node[j - 1];
-        node[j] = moved;
-    }
-}
+/* Words of an item of a bucket while it is sorted: its corners after the lowest one, ascending, and last the item, so
+ * that equal ones stay as they are. Sides have four corners at most. */
+enum { SIDE_WORDS = 3, ELEMENT_WORDS = UZ_MOST_CORNERS / 2 + 1 };
 
-/* The corners of a side or of a whole element, -1 beyond them; how many there are. */
-static int list_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
+static const int ALL[UZ_MOST_CORNERS] = {0, 1, 2, 3, 4, 5, 6, 7};
+
+/* Corners of a side or of a whole element: node[local[i]], i < *count. */
+static const int *list_corners(int *count, const int64_t **node, const uz_mesh *mesh, uz_face item)
 {
     const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[item.element]);
-    const int64_t *node = mesh->node + mesh->first[item.element];
-    const int *local = item.side < 0 ? NULL : type->side[item.side].node;
-    const int count = item.side < 0 ? type->corners : type->side[item.side].corners;
-    for (int i = 0; i < UZ_MOST_CORNERS; i++)
-        corner[i] = i >= count ? -1 : local ? node[local[i]] : node[i];
-    return count;
+    *node = mesh->node + mesh->first[item.element];
+    *count = item.side < 0 ? type->corners : type->side[item.side].corners;
+    return item.side < 0 ? ALL : type->side[item.side].node;
 }
 
-/* The same, ascending. */
-static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
+static int64_t lowest_corner(const int64_t *node, const int *local, int count)
 {
-    sort_nodes(corner, list_corners(corner, mesh, item));
-}
-
-static int64_t lowest_corner(const uz_mesh *mesh, uz_face item)
-{
-    int64_t corner[UZ_MOST_CORNERS];
-    const int count = list_corners(corner, mesh, item);
-    int64_t lowest = corner[0];
+    int64_t lowest = node[local[0]];
     for (int i = 1; i < count; i++)
-        lowest = corner[i] < lowest ? corner[i] : lowest;
+        lowest = node[local[i]] < lowest ? node[local[i]] : lowest;
     return lowest;
 }
 
-static int compare_corners(const int64_t *a, const int64_t *b)
+static inline void put_in_order(corner_number *a, corner_number *b)
 {
-    for (int i = 0; i < UZ_MOST_CORNERS - 1; i++)
-        if (a[i] != b[i])
-            return a[i] < b[i] ? -1 : 1;
+    const corner_number less = *a < *b ? *a : *b, more = *a < *b ? *b : *a;
+    *a = less;
+    *b = more;
+}
+
+/* Ascending, in their place, without a choice of ways: which is the greater cannot be foretold. */
+static void sort_four(corner_number corner[4])
+{
+    put_in_order(&corner[0], &corner[1]);
+    put_in_order(&corner[2], &corner[3]);
+    put_in_order(&corner[0], &corner[2]);
+    put_in_order(&corner[1], &corner[3]);
+    put_in_order(&corner[1], &corner[2]);
+}
+
+static void sort_corners(corner_number *corner, int count)
+{
+    for (int i = 1; i < count; i++) {
+        const corner_number moved = corner[i];
+        int j = i;
+        for (; j > 0 && corner[j - 1] > moved; j--)
+            corner[j] = corner[j - 1];
+        corner[j] = moved;
+    }
+}
+
+/* The words of the corners alone; node[local[i]], i < count. */
+UZ_INLINE void make_words(uint64_t *word, const int64_t *node, const int *local, int count, int words)
+{
+    corner_number corner[UZ_MOST_CORNERS + 4] = {0}; /* up to 4 end at [3], as the zeros come first */
+    const int first = count < 4 ? 4 - count : 0;
+    for (int i = 0; i < count; i++)
+        corner[first + i] = (corner_number)(node[local[i]] + 1);
+    if (count <= 4)
+        sort_four(corner);
+    else
+        sort_corners(corner, count);
+    const corner_number *next = corner + first + 1;
+    for (int w = 0; w < words - 1; w++)
+        word[w] = (uint64_t)next[2 * w] << 32 | next[2 * w + 1];
+}
+
+UZ_INLINE void words_of_item(uint64_t *word, const uz_mesh *mesh, uz_face item, int words)
+{
+    const int64_t *node;
+    int count;
+    const int *local = list_corners(&count, &node, mesh, item);
+    make_words(word, node, local, count, words);
+}
+
+/* As the sign of a difference. */
+UZ_INLINE int compare(const uint64_t *a, const uint64_t *b, int words)
+{
+    for (int w = 0; w < words; w++)
+        if (a[w] != b[w])
+            return a[w] < b[w] ? -1 : 1;
     return 0;
 }
 
-static int compare_entries(const void *a, const void *b)
+static int compare_sides(const void *a, const void *b)
 {
-    const sort_entry *x = a, *y = b;
-    const int order = compare_corners(x->corner, y->corner);
-    return order ? order : (x->item > y->item) - (x->item < y->item);
+    return compare(a, b, SIDE_WORDS);
+}
+
+static int compare_elements(const void *a, const void *b)
+{
+    return compare(a, b, ELEMENT_WORDS);
 }
 
 /* Calls for every item: counts it into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
@@ -73,7 +113,10 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const int last = sides ? uz_element_type_of((uz_element_kind)mesh->kind[e])->sides - 1 : -1;
         for (int s = sides ? 0 : -1; s <= last; s++) {
-            const int64_t lowest = lowest_corner(mesh, (uz_face){e, s});
+            int count;
+            const int64_t *node;
+            const int *local = list_corners(&count, &node, mesh, (uz_face){e, s});
+            const int64_t lowest = lowest_corner(node, local, count);
             if (place)
                 table->item[table->start[lowest]++] = UZ_CORNER_TABLE_SIDES * e + s + 1;
             else
@@ -86,39 +129,46 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
 typedef struct {
     uz_corner_table *table;
     const uz_mesh *mesh;
+    bool sides;
     int64_t largest; /* items of a bucket */
     atomic_bool no_memory;
 } sorting;
 
-/* Those of some nodes, by their items' corners. */
+/* The items of a bucket, count from `first` on, by their corners. entry: room for as many. */
+UZ_INLINE void sort_bucket(uint64_t *entry, const sorting *x, int64_t first, int64_t count, int words)
+{
+    enum { FEW = 64 }; /* but in meshes made to be hard: a node is the lowest of some sides */
+    const size_t size = (size_t)words * sizeof *entry;
+    for (int64_t i = 0; i < count; i++) {
+        uint64_t added[ELEMENT_WORDS];
+        words_of_item(added, x->mesh, uz_corner_table_item(x->table, first + i), words);
+        added[words - 1] = (uint64_t)x->table->item[first + i];
+        int64_t j = i;
+        for (; count <= FEW && j > 0 && compare(entry + words * (j - 1), added, words) > 0; j--)
+            memcpy(entry + words * j, entry + words * (j - 1), size);
+        memcpy(entry + words * j, added, size);
+    }
+    if (count > FEW)
+        qsort(entry, (size_t)count, size, words == SIDE_WORDS ? compare_sides : compare_elements);
+    for (int64_t i = 0; i < count; i++) {
+        x->table->item[first + i] = (int64_t)entry[words * i + words - 1];
+        x->table->same[first + i] = i > 0 && compare(entry + words * i, entry + words * (i - 1), words - 1) == 0;
+    }
+}
+
+/* Those of some nodes. */
 static void sort_buckets(void *ctx, int64_t begin, int64_t end)
 {
-    enum { FEW = 16 }; /* in a bucket, but in meshes made to be hard: a node is the lowest of a few sides */
     sorting *x = ctx;
-    const uz_corner_table *table = x->table;
-    int64_t corner[UZ_MOST_CORNERS];
-    sort_entry *entry = uz_alloc(x->largest, sizeof *entry);
+    uint64_t *entry = uz_alloc(x->largest, ELEMENT_WORDS * sizeof *entry);
     if (!entry)
         x->no_memory = true;
     for (int64_t node = begin; entry && node < end; node++) {
-        const int64_t first = table->start[node], count = table->start[node + 1] - first;
-        int64_t *item = table->item + first;
-        unsigned char *same = table->same + first;
-        for (int64_t i = 0; i < count; i++) {
-            sort_entry added = {.item = item[i]};
-            int64_t j = i;
-            sorted_corners(corner, x->mesh, uz_corner_table_item(table, first + i));
-            memcpy(added.corner, corner + 1, sizeof added.corner);
-            for (; count <= FEW && j > 0 && compare_entries(&entry[j - 1], &added) > 0; j--)
-                entry[j] = entry[j - 1];
-            entry[j] = added;
-        }
-        if (count > FEW)
-            qsort(entry, (size_t)count, sizeof *entry, compare_entries);
-        for (int64_t i = 0; i < count; i++) {
-            item[i] = entry[i].item;
-            same[i] = i > 0 && compare_corners(entry[i].corner, entry[i - 1].corner) == 0;
-        }
+        const int64_t first = x->table->start[node], count = x->table->start[node + 1] - first;
+        if (x->sides)
+            sort_bucket(entry, x, first, count, SIDE_WORDS);
+        else
+            sort_bucket(entry, x, first, count, ELEMENT_WORDS);
     }
     free(entry);
 }
@@ -135,7 +185,7 @@ uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool 
         out->item = uz_alloc(out->count, sizeof *out->item);
         out->same = uz_alloc(out->count + 1, sizeof *out->same);
     }
-    sorting x = {.table = out, .mesh = mesh, .no_memory = !out->start || !out->item || !out->same};
+    sorting x = {.table = out, .mesh = mesh, .sides = sides, .no_memory = !out->start || !out->item || !out->same};
     if (!x.no_memory) {
         walk_items(out, mesh, sides, true);
         memmove(out->start + 1, out->start, (size_t)mesh->n_nodes * sizeof *out->start); /* placing moved each on */
@@ -158,25 +208,24 @@ void uz_corner_table_clear(uz_corner_table *table)
     memset(table, 0, sizeof *table);
 }
 
-int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, int64_t *corner, int count)
+int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, const int64_t *corner, int count)
 {
-    int64_t wanted[UZ_MOST_CORNERS], there[UZ_MOST_CORNERS];
-    sort_nodes(corner, count);
-    for (int i = 0; i < UZ_MOST_CORNERS; i++)
-        wanted[i] = i < count ? corner[i] : -1;
-    int64_t low = table->start[corner[0]], high = table->start[corner[0] + 1], end = high;
+    uint64_t wanted[ELEMENT_WORDS], there[ELEMENT_WORDS];
+    make_words(wanted, corner, ALL, count, ELEMENT_WORDS);
+    const int64_t lowest = lowest_corner(corner, ALL, count);
+    int64_t low = table->start[lowest], high = table->start[lowest + 1], end = high;
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        sorted_corners(there, mesh, uz_corner_table_item(table, middle));
-        if (compare_corners(there + 1, wanted + 1) < 0)
+        words_of_item(there, mesh, uz_corner_table_item(table, middle), ELEMENT_WORDS);
+        if (compare(there, wanted, ELEMENT_WORDS - 1) < 0)
             low = middle + 1;
         else
             high = middle;
     }
     if (low == end)
         return -1;
-    sorted_corners(there, mesh, uz_corner_table_item(table, low));
-    return compare_corners(there + 1, wanted + 1) == 0 ? low : -1;
+    words_of_item(there, mesh, uz_corner_table_item(table, low), ELEMENT_WORDS);
+    return compare(there, wanted, ELEMENT_WORDS - 1) == 0 ? low : -1;
 }
 
 /* A side that lies within a subdivided body has no other with the same corners. */

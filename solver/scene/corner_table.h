@@ -29,8 +29,8 @@ static inline uz_face uz_corner_table_item(const uz_corner_table *table, int64_t
 uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool sides, uz_error *err);
 void uz_corner_table_clear(uz_corner_table *table);
 
-/* Place of the first item with these corners, which are sorted here; -1 if there is none. Nodes must be in range. */
-int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, int64_t *corner, int count);
+/* Place of the first item with these corners, in any order; -1 if there is none. Nodes must be in range. */
+int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, const int64_t *corner, int count);
 
 /* The sides that belong to one element only, whatever groups are called: out->face, n_faces, in the order of such a
  * table. The caller frees out->face. Error: UZ_ERR_MEMORY. */

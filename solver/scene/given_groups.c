@@ -125,7 +125,7 @@ static uz_status refuse_face(const group_work *work, const uz_given_group *group
 static uz_status collect_face(named_parts *parts, group_work *work, const uz_given_group *group, int64_t i)
 {
     static const int CORNERS[2][UZ_FACE_NODES + 1] = {{0, 0, 2, 2}, {0, 0, 0, 3, 4, 0, 3, 0, 4}}; /* among so many */
-    int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS], there[UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES], there[UZ_FACE_NODES];
     const int64_t count = group->face_first[i + 1] - group->face_first[i];
     const int dim = work->mesh->dim, corners = count > 0 && count <= UZ_FACE_NODES ? CORNERS[dim - 2][count] : 0;
     if (corners == 0)
@@ -140,8 +140,7 @@ static uz_status collect_face(named_parts *parts, group_work *work, const uz_giv
         if (node[k] < 0)
             return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
     }
-    memcpy(corner, node, (size_t)corners * sizeof *corner);
-    const int64_t place = uz_corner_table_find(&work->sides, work->mesh, corner, corners);
+    const int64_t place = uz_corner_table_find(&work->sides, work->mesh, node, corners);
     if (place < 0)
         return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
     const int has = uz_mesh_face(there, work->mesh, uz_corner_table_item(&work->sides, place));

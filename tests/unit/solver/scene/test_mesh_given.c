@@ -203,6 +203,53 @@ TEST(shapes_in_space_are_checked)
     expect(&m, 3, UZ_ERR_SCENE, "/mesh/elements/tet10/0", "node");
 }
 
+/* How much of the volume of its edges a tetrahedron has at the corner where that is least. */
+static double least_volume(const double *x)
+{
+    double least = INFINITY;
+    for (int a = 0; a < 4; a++) {
+        double t[3][3], product = 1;
+        for (int k = 0; k < 3; k++) {
+            for (int c = 0; c < 3; c++)
+                t[k][c] = x[3 * ((a + k + 1) % 4) + c] - x[3 * a + c];
+            product *= hypot(hypot(t[k][0], t[k][1]), t[k][2]);
+        }
+        const double volume = t[0][0] * (t[1][1] * t[2][2] - t[1][2] * t[2][1]) -
+                              t[0][1] * (t[1][0] * t[2][2] - t[1][2] * t[2][0]) +
+                              t[0][2] * (t[1][0] * t[2][1] - t[1][1] * t[2][0]);
+        least = fmin(least, fabs(volume) / product);
+    }
+    return least;
+}
+
+/* Also one that is flat at a corner that is not its first: over slender ones and all of which is the first. */
+TEST(flat_tetrahedra_are_refused_at_any_corner)
+{
+    static const int TURN[4][4] = {{0, 1, 2, 3}, {1, 0, 3, 2}, {2, 3, 0, 1}, {3, 2, 1, 0}}; /* rotations */
+    int flat = 0, good = 0;
+    for (int k = 0; k < 4 * 16 * 16; k++) {
+        const int shorter = k / 4 % 16, lower = k / 64;
+        small_mesh m;
+        double x[12];
+        solid(&m, UZ_TET4);
+        m.xyz[3] = pow(10, -shorter);
+        m.xyz[9] = m.xyz[10] = 0.3;
+        m.xyz[11] = pow(10, -lower) * 0.7;
+        memcpy(x, m.xyz, sizeof x);
+        for (int a = 0; a < 4; a++)
+            memcpy(m.xyz + 3 * a, x + 3 * TURN[k % 4][a], 3 * sizeof *x);
+        const double least = least_volume(m.xyz);
+        if (fabs(least - 1e-12) < 1e-14)
+            continue;
+        if (least > 1e-12)
+            expect(&m, 3, UZ_OK, "", "");
+        else
+            expect(&m, 3, UZ_ERR_SCENE, "/mesh/elements/tet4/0", "no volume at its node");
+        *(least > 1e-12 ? &good : &flat) += 1;
+    }
+    CHECK(flat > 200 && good > 200);
+}
+
 /* A node in the middle of an edge that is a quarter away from a corner makes the volume vanish there. */
 TEST(middles_out_of_place_are_refused)
 {
