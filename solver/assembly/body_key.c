@@ -47,55 +47,33 @@ static void put_doubles(uz_buffer *key, const double *x, int64_t n)
         put_double(key, x[i]);
 }
 
-static void add_array(uz_digest *digest, const void *array, int64_t count, size_t size)
+/* A mesh in numbers is as large as a request may be: a digest stands for them, "" for one that was not made. */
+static void put_digest(uz_buffer *key, const char digest[65])
 {
-    const int64_t n = array ? count : 0;
-    if (!digest)
-        return;
-    uz_digest_add(digest, &n, sizeof n);
-    if (n > 0)
-        uz_digest_add(digest, array, (size_t)n * size);
+    key->failed |= !digest[0];
+    uz_buffer_put(key, digest, 65);
 }
 
-/* Ends a digest, which stands for numbers that are as large as a mesh. NULL: there was no memory for it. */
-static void put_digest(uz_buffer *key, uz_digest *digest)
-{
-    char hex[65] = "";
-    if (!digest || !uz_digest_end(digest, hex))
-        key->failed = true;
-    uz_buffer_put(key, hex, sizeof hex);
-}
-
-/* A mesh in numbers is as large as a request may be. */
 static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
 {
-    uz_digest *digest = uz_digest_new();
-    add_array(digest, mesh->xyz, mesh->n_nodes * mesh->dim, sizeof *mesh->xyz);
-    add_array(digest, mesh->kind, mesh->n_elements, sizeof *mesh->kind);
-    add_array(digest, mesh->first, mesh->n_elements + 1, sizeof *mesh->first);
-    add_array(digest, mesh->node, mesh->first ? mesh->first[mesh->n_elements] : 0, sizeof *mesh->node);
-    for (int64_t i = 0; i < mesh->n_groups; i++) {
-        const uz_given_group *group = &mesh->groups[i];
-        const int64_t faces = group->n_faces;
-        add_array(digest, group->name, (int64_t)strnlen(group->name, sizeof group->name), 1);
-        add_array(digest, group->node, group->n_nodes, sizeof *group->node);
-        add_array(digest, group->face_first, faces > 0 ? faces + 1 : 0, sizeof *group->face_first);
-        add_array(digest, group->face_node, faces > 0 ? group->face_first[faces] : 0, sizeof *group->face_node);
-        add_array(digest, group->element, group->n_elements, sizeof *group->element);
-    }
+    char digest[65];
     put_int(key, mesh->dim);
     put_int(key, mesh->n_groups);
     put_int(key, mesh->from_file != NULL);
+    uz_given_digest(digest, mesh);
     put_digest(key, digest);
 }
 
 static void put_triangles(uz_buffer *key, const uz_contact *contact)
 {
     uz_digest *digest = uz_digest_new();
-    add_array(digest, contact->x, contact->n_x, sizeof *contact->x);
-    add_array(digest, contact->y, contact->n_x, sizeof *contact->y);
-    add_array(digest, contact->z, contact->n_x, sizeof *contact->z);
-    put_digest(key, digest);
+    const double *const list[3] = {contact->x, contact->y, contact->z};
+    char hex[65] = "";
+    for (int c = 0; digest && c < 3; c++)
+        uz_digest_add_list(digest, list[c], contact->n_x, sizeof **list);
+    if (digest)
+        uz_digest_end(digest, hex);
+    put_digest(key, hex);
 }
 
 /* Groups by where they are. All of them: what a load pushes on must be there in the body that is found. */

@@ -28,6 +28,14 @@ void uz_digest_add(uz_digest *digest, const void *data, size_t len)
         digest->failed |= gnutls_hash(digest->state, data, len) != 0;
 }
 
+void uz_digest_add_list(uz_digest *digest, const void *list, int64_t count, size_t size)
+{
+    const int64_t n = list ? count : 0;
+    uz_digest_add(digest, &n, sizeof n);
+    if (n > 0)
+        uz_digest_add(digest, list, (size_t)n * size);
+}
+
 bool uz_digest_end(uz_digest *digest, char hex[65])
 {
     unsigned char bytes[32] = {0};

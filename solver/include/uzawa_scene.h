@@ -71,6 +71,10 @@ typedef struct {
     int64_t n_groups;
     const char *from_file; /* where the file is in a request, as "/mesh/gmsh" (static text); NULL: in numbers. Of a
                             * file, nodes that no element uses (construction points) are left out, not refused */
+    char digest[65];       /* SHA-256 of all that, where it is known already; "": it is not */
+    /* Whose arrays those are, if not its own, and how they are given back (uz_mesh_read_kept); NULL: its own. */
+    void *lender;
+    void (*give_back)(void *lender);
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 

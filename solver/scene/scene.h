@@ -35,4 +35,7 @@ double uz_support_angle(const uz_support *support);
  * contact row out of noise. False where there is no direction (zero, NaN, Inf). */
 bool uz_unit_normal(double out[3], const double normal[3], int dim);
 
+/* SHA-256 of a mesh in numbers, hex: the one that it has, or of what its arrays say. "": there is no memory for it. */
+void uz_given_digest(char hex[65], const uz_given_mesh *mesh);
+
 #endif
