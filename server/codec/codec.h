@@ -77,6 +77,9 @@ typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
  * the caller clears *out. */
 bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
                   problem_details *problem);
+/* The same with a cache, or NULL, that keeps meshes of uploads: it must outlive *out. */
+bool codec_decode_kept(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                       uz_cache *meshes, problem_details *problem);
 /* All that the schema has against a body that codec_decode refuses, as problem+json whose `mistakes` they are. NULL: it
  * has no more than one thing against it, or there is no memory: what codec_decode says is all. */
 char *codec_mistakes(const char *body, size_t len);

@@ -304,11 +304,17 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
 bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
                   problem_details *problem)
 {
+    return codec_decode_kept(out, kind, body, len, uploads, NULL, problem);
+}
+
+bool codec_decode_kept(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                       uz_cache *meshes, problem_details *problem)
+{
     json_tree tree;
     codec_request request = {.tags = NULL};
     /* A matrix that can be solved has an entry of at least six bytes of text for each unknown, so no honest request
      * comes near this; a size line alone must not fill the machine. */
-    decoding d = {.store = uploads, .bound = ((size_t)64 << 20) + 32 * len, .problem = problem};
+    decoding d = {.store = uploads, .meshes = meshes, .bound = ((size_t)64 << 20) + 32 * len, .problem = problem};
     *out = request;
     if (!json_scan(&tree, body, len, problem))
         return false;

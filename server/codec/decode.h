@@ -15,8 +15,9 @@ typedef struct {
     struct store *store; /* where uploads are read that it names; NULL: there are none */
     char (*uploads)[65]; /* n_uploads ids that were read, each once; who takes them sets it to NULL */
     size_t n_uploads;
-    size_t bound;    /* bytes that one matrix or vector may take */
-    uz_scene *scene; /* what groups are of; NULL: the problem is in matrices */
+    uz_cache *meshes; /* keeps those of uploads; NULL: nobody does */
+    size_t bound;     /* bytes that one matrix or vector may take */
+    uz_scene *scene;  /* what groups are of; NULL: the problem is in matrices */
     problem_details *problem;
 } decoding;
 
@@ -74,6 +75,7 @@ bool decode_components(double out[3], decoding *d, const json_value *object, con
 typedef struct {
     const char *data; /* not NUL-terminated */
     size_t len;
+    const char *digest; /* of an upload, hex: its id; NULL: it came with the request */
     char *copy;         /* of a long string */
     upload_text mapped; /* of an upload */
 } decode_source;

@@ -104,6 +104,7 @@ static bool open_source(decode_source *out, decoding *d, const json_value *value
     if (status == STORE_OK) {
         out->data = out->mapped.data;
         out->len = out->mapped.len;
+        out->digest = id;
         for (size_t i = 0; i < d->n_uploads; i++) /* each is noted once */
             if (strcmp(d->uploads[i], id) == 0)
                 return true;

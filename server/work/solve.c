@@ -87,7 +87,8 @@ void solve_job(solution *out, const solve_with *with, const char *id, char *body
     uz_error err = {0};
     double start = clock_seconds(CLOCK_MONOTONIC);
     *out = (solution){.n = 0};
-    bool good = body && codec_decode(&out->request, CODEC_STORED, body, body_len, with->source, &problem);
+    bool good =
+        body && codec_decode_kept(&out->request, CODEC_STORED, body, body_len, with->source, with->cache, &problem);
     if (!body)
         codec_problem_damaged(&problem, id);
     free(body);

@@ -85,15 +85,20 @@ static uz_item *take_out(uz_cache *cache, uz_item *item, uz_item *before)
     return item;
 }
 
-/* Takes unused objects out, oldest first, until the rest fits; they are a list by `older`. */
+/* Takes unused objects out, oldest first, until the rest fits: meshes, which are soon read again, then all. They are a
+ * list by `older`. A mesh in use would be in memory without a cache too: nothing makes room for it but other meshes. */
 static uz_item *evict(uz_cache *cache)
 {
-    uz_item *out = NULL, *item = cache->oldest;
-    while (item && cache->bytes > cache->max_bytes) {
-        uz_item *newer = item->newer;
-        if (item->users == 0)
-            out = take_out(cache, item, out);
-        item = newer;
+    uz_item *out = NULL;
+    size_t most = cache->max_bytes;
+    for (int all = 0; all < 2; all++) {
+        for (uz_item *item = cache->oldest, *newer; item && cache->bytes > most; item = newer) {
+            newer = item->newer;
+            if (item->users == 0 && (all || item->kind == UZ_ITEM_MESH))
+                out = take_out(cache, item, out);
+        }
+        for (const uz_item *item = cache->oldest; item; item = item->newer)
+            most += item->users > 0 && item->kind == UZ_ITEM_MESH ? item->bytes : 0;
     }
     return out;
 }

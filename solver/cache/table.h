@@ -1,6 +1,6 @@
-/* table.h: reference-counted objects by kind and digest, bounded in bytes, the least recently used first out, with one
- * creator per object while others wait for it. What the objects are is their owners' business: setups
- * (run/setup_cache.h), factors and analyses (parts.h).
+/* table.h: reference-counted objects by kind and digest, bounded in bytes, the least recently used first out
+ * (meshes before all others), with one creator per object while others wait for it. What the objects are is their
+ * owners' business: setups (run/setup_cache.h), factors and analyses (parts.h), meshes of files (meshes.c).
  *
  * An object may hold uses of others in the same table and give them back when it is destroyed: nothing is destroyed
  * under the mutex. */
@@ -9,7 +9,7 @@
 
 #include "uzawa.h"
 
-typedef enum { UZ_ITEM_SETUP, UZ_ITEM_FACTOR, UZ_ITEM_ANALYSIS } uz_item_kind;
+typedef enum { UZ_ITEM_SETUP, UZ_ITEM_FACTOR, UZ_ITEM_ANALYSIS, UZ_ITEM_MESH } uz_item_kind;
 typedef struct uz_item uz_item;
 
 /* A use of the item, which the caller gives back with uz_table_release. *create: nobody has it and the caller must

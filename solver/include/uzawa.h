@@ -52,6 +52,12 @@ typedef struct {
  * in the bytes of the first. */
 uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count, uz_error *err);
 
+/* uz_mesh_read of a file that may come again: its mesh stays in the cache under the file's digest (hex, of the caller's
+ * choice: no other file may have it), and *out has a use of it, whose arrays are only to be read, until it is cleared;
+ * the cache must last as long. Small files, and those of a cache that is NULL, are read as by uz_mesh_read. */
+uz_status uz_mesh_read_kept(uz_given_mesh *out, uz_cache *cache, const char *digest, const char *format,
+                            const char *text, size_t len, size_t max_bytes, uz_error *err);
+
 /* ----------------------------------------------------------------- reserve */
 
 /* Memory that factors are made in, and that is kept when they are freed as long as both together take at most `most`

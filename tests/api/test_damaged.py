@@ -131,6 +131,32 @@ def test_an_upload(s):
     check(findings(s)[0] == 0, findings(s))
 
 
+@options("--workers", "1")
+def test_an_upload_that_was_solved(s):
+    """A mesh that a process has read and keeps stands for a file that is there and what it was."""
+    text = b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0\n$EndNodes\n$Elements\n" \
+           b"3\n1 1 0 1 2\n2 2 0 1 2 3\n3 2 0 2 4 3\n$EndElements\n$Comments\n" + (1 << 20) * b"x" + b"\n$EndComments\n"
+    upload = s.request("POST", "/v1/uploads", text).json["id"]
+    body = {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"gmsh": {"upload": upload}},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                        "supports": [{"on": {"where": {"y": 0}}, "ux": 0, "uy": 0}],
+                        "loads": [{"on": "all", "body_force": [0, -1]}]}}
+    first = s.solve(body)
+    again = s.solve(body)
+    check(first["summary"]["energy"] == again["summary"]["energy"], first, again)
+    other = s.request("POST", "/v1/uploads", text + b"\n").json["id"]  # another file of the same mesh has its body
+    same = s.solve({"problem": {**body["problem"], "mesh": {"gmsh": {"upload": other}}}})
+    check(same["summary"]["factor"]["cached"], same)
+    running = s.post(ENDLESS).json["id"]  # the only worker: the next job waits
+    s.wait_status(running, "running")
+    waits = s.post(body).json["id"]
+    file = pathlib.Path(s.file() + "-uploads") / upload
+    file.write_bytes(text.replace(b"4 1 1 0", b"4 1 2 0"))
+    s.request("DELETE", f"/v1/jobs/{running}")
+    job = s.wait_status(waits, "failed", "successful")
+    check(job["status"] == "failed" and job["error"]["code"] == "stored_data_damaged", job)
+
+
 def test_a_start(s):
     """A run does not begin where a damaged one ended."""
     job = s.solve(SCENE)["id"]

@@ -1,4 +1,5 @@
 /* Uploads in the store: what the API tests can't reach or would wait for. */
+#include "codec/codec.h"
 #include "store/engine_base.h"
 #include "upload_place.h"
 
@@ -129,5 +130,46 @@ STORE_TEST(an_upload_in_use_stays)
     CHECK_INT(store_collect_uploads(p.s, &count), STORE_OK);
     CHECK(count == 1 && files_in(&p) == 0);
     job_clear(&j);
+    end_place(&p);
+}
+
+/* How many bytes the request has beside the file decides nothing: a shorter one takes the mesh that a longer one left.
+ */
+STORE_TEST(a_mesh_is_kept_for_shorter_requests)
+{
+    static const char MESH[] = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n"
+                               "$Elements\n1\n1 2 0 1 2 3\n$EndElements\n";
+    enum { LEN = 2 << 20 };
+    place p;
+    upload_info info;
+    bool known;
+    char why[256] = "";
+    if (!place_begin(&p))
+        return;
+    CHECK_MSG(codec_init(NULL, why, sizeof why), "%s", why);
+    char *text = malloc(LEN), body[1024];
+    uz_cache *cache = uz_cache_new(1 << 20);
+    memset(text, '\n', LEN);
+    memcpy(text, MESH, sizeof MESH - 1);
+    CHECK_INT(send(p.s, text, LEN, LEN, false, &info, &known), UPLOAD_OK);
+    const double *xyz = NULL;
+    for (int spaces = 100; spaces >= 0; spaces -= 50) {
+        codec_request request;
+        problem_details problem = {0};
+        const int len = snprintf(
+            body, sizeof body,
+            "{\"problem\":{\"kind\":\"scene\",\"model\":\"plane_strain\",\"mesh\":{\"gmsh\":{\"upload\":\"%s\"}},"
+            "\"materials\":[{\"on\":\"all\",\"young\":1,\"poisson\":0.3}],"
+            "\"supports\":[{\"on\":{\"where\":{\"y\":0}},\"ux\":0,\"uy\":0}]}}%*s",
+            info.id, spaces, "");
+        CHECK_MSG(codec_decode_kept(&request, CODEC_SOLVE, body, (size_t)len, p.s, cache, &problem), "%s",
+                  problem.detail);
+        CHECK(request.problem.scene.given.lender && (!xyz || request.problem.scene.given.xyz == xyz));
+        xyz = request.problem.scene.given.xyz;
+        codec_request_clear(&request);
+    }
+    codec_end();
+    uz_cache_free(cache);
+    free(text);
     end_place(&p);
 }

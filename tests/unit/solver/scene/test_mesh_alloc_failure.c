@@ -1,5 +1,6 @@
 /* Each allocation on the way from a file, numbers or a box to a mesh fails once: the call must say so, publish nothing
  * and keep nothing. Linked with malloc, calloc, realloc and free wrapped. */
+#include "core/error.h"
 #include "failing_heap.h"
 #include "gmsh_text.h"
 #include "harness.h"
@@ -47,6 +48,31 @@ TEST(gmsh_files)
         write_gmsh(&file, &TET_SOURCE, k < 2 ? 22 : 41, k % 2);
         CHECK(fail_each(read_and_mesh) > 25);
     }
+}
+
+/* Into a cache, and out of it. */
+static uz_status read_kept(uz_error *err)
+{
+    static char text[(1 << 20) + GMSH_TEXT_ROOM];
+    uz_given_mesh given = {0};
+    uz_cache *cache = uz_cache_new(1 << 20);
+    uz_status status = cache ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no cache");
+    memset(text, '\n', sizeof text);
+    memcpy(text, file.text, file.len);
+    for (int k = 0; k < 2 && status == UZ_OK; k++) {
+        uz_given_mesh_clear(&given);
+        status = uz_mesh_read_kept(&given, cache, "one", "gmsh", text, sizeof text, 0, err);
+        CHECK((given.xyz != NULL) == (status == UZ_OK));
+    }
+    uz_given_mesh_clear(&given);
+    uz_cache_free(cache);
+    return status;
+}
+
+TEST(gmsh_files_that_are_kept)
+{
+    write_gmsh(&file, &TET_SOURCE, 41, false);
+    CHECK(fail_each(read_kept) > 25);
 }
 
 /* Tags too far apart for a table. */
