@@ -63,11 +63,11 @@ UZ_INLINE void look_at(lane_bits *good, uz_lanes J[3][3], int dim)
     *good &= (lane_bits)(det > 0) & (lane_bits)(det * det > squares);
 }
 
-UZ_INLINE void look_at_corners(lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x, int dim)
+UZ_INLINE void look_at_corners(lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x, int nodes, int dim)
 {
     for (int a = 0; a < rule->corners; a++) {
         uz_lanes J[3][3];
-        jacobian(J, rule->corner_slope[a], x, rule->nodes, dim);
+        jacobian(J, rule->corner_slope[a], x, nodes, dim);
         look_at(good, J, dim);
     }
 }
@@ -82,18 +82,18 @@ typedef struct {
 } integrand;
 
 UZ_INLINE void differentiate(integrand *of, lane_bits *good, const uz_stiffness_rule *rule, const uz_lanes *x,
-                             double thickness, int dim)
+                             double thickness, int nodes, int points, int dim)
 {
-    for (int g = 0; g < rule->points; g++) {
+    for (int g = 0; g < points; g++) {
         uz_lanes J[3][3], inverse[3][3], det;
-        jacobian(J, rule->slope[g], x, rule->nodes, dim);
+        jacobian(J, rule->slope[g], x, nodes, dim);
         if (rule->checks_rule)
             look_at(good, J, dim);
         uz_lane_invert(inverse, &det, J, dim);
         of->volume[g] = rule->weight[g] * det;
         if (rule->model != UZ_SOLID)
             of->volume[g] *= thickness;
-        for (int a = 0; a < rule->nodes; a++)
+        for (int a = 0; a < nodes; a++)
             for (int j = 0; j < dim; j++) {
                 uz_lanes sum = {0};
                 for (int i = 0; i < dim; i++)
@@ -159,25 +159,26 @@ UZ_INLINE void look_at_block(lane_bits *good, uz_lanes block[3][3], bool diagona
 }
 
 UZ_INLINE bool stiffness_of(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
-                            const uz_lanes *x, const uz_lane_material *material, double thickness, int dim)
+                            const uz_lanes *x, const uz_lane_material *material, double thickness, int nodes,
+                            int points, int dim)
 {
     integrand of;
     uz_lanes own[UZ_ELEMENT_GAUSS][3], block[3][3];
-    const int n = rule->nodes * dim;
+    const int n = nodes * dim;
     lane_bits good = (lane_bits){0} - 1;
-    look_at_corners(&good, rule, x, dim);
+    look_at_corners(&good, rule, x, nodes, dim);
     of.lambda = material->lambda;
     of.mu = material->mu;
     of.averaged = formulation == UZ_FORMULATION_BBAR;
-    differentiate(&of, &good, rule, x, thickness, dim);
+    differentiate(&of, &good, rule, x, thickness, nodes, points, dim);
     if (of.averaged)
         average(&of, rule, n);
-    for (int a = 0; a < rule->nodes; a++) {
-        for (int g = 0; g < rule->points; g++)
+    for (int a = 0; a < nodes; a++) {
+        for (int g = 0; g < points; g++)
             for (int i = 0; i < dim; i++)
                 own[g][i] = of.volume[g] * of.grad[g][a * dim + i];
         for (int b = 0; b <= a; b++) {
-            find_block(block, &of, own, rule->points, a, b, dim);
+            find_block(block, &of, own, points, a, b, dim);
             look_at_block(&good, block, a == b, dim);
             for (int i = 0; i < dim; i++)
                 for (int j = 0; j < dim; j++)
@@ -196,8 +197,10 @@ UZ_INLINE bool stiffness_in_space(double *const ke[LANES], const uz_stiffness_ru
                                   const uz_lanes *x, const uz_lane_material *material, double thickness)
 {
     if (rule->dim == 2)
-        return stiffness_of(ke, rule, formulation, x, material, thickness, 2);
-    return stiffness_of(ke, rule, formulation, x, material, thickness, 3);
+        return stiffness_of(ke, rule, formulation, x, material, thickness, rule->nodes, rule->points, 2);
+    if (rule->kind == UZ_TET4) /* one point: what it takes is loops, unless they are unrolled */
+        return stiffness_of(ke, rule, UZ_FORMULATION_STANDARD, x, material, thickness, 4, 1, 3);
+    return stiffness_of(ke, rule, formulation, x, material, thickness, rule->nodes, rule->points, 3);
 }
 
 UZ_AVX2 static bool stiffness_wide(double *const ke[LANES], const uz_stiffness_rule *rule, uz_formulation formulation,
