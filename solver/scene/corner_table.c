@@ -107,21 +107,32 @@ static int compare_elements(const void *a, const void *b)
     return compare(a, b, ELEMENT_WORDS);
 }
 
-/* Calls for every item: counts it into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
-static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, bool place)
+/* Counts an item into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
+UZ_INLINE void walk_item(uz_corner_table *table, const int64_t *node, const int *local, int count, int64_t item,
+                         bool place)
+{
+    int64_t lowest = node[local[0]];
+    for (int i = 1; i < count; i++)
+        lowest = node[local[i]] < lowest ? node[local[i]] : lowest;
+    if (place)
+        table->item[table->start[lowest]++] = item;
+    else
+        table->start[lowest + 1]++;
+}
+
+/* So with every item. */
+UZ_INLINE void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, bool place)
 {
     for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const int last = sides ? uz_element_type_of((uz_element_kind)mesh->kind[e])->sides - 1 : -1;
-        for (int s = sides ? 0 : -1; s <= last; s++) {
-            int count;
-            const int64_t *node;
-            const int *local = list_corners(&count, &node, mesh, (uz_face){e, s});
-            const int64_t lowest = lowest_corner(node, local, count);
-            if (place)
-                table->item[table->start[lowest]++] = UZ_CORNER_TABLE_SIDES * e + s + 1;
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        const int64_t *node = mesh->node + mesh->first[e], item = UZ_CORNER_TABLE_SIDES * e;
+        if (!sides)
+            walk_item(table, node, ALL, type->corners, item, place);
+        for (int s = 0; sides && s < type->sides; s++)
+            if (type->side[s].corners == 3) /* the number decides how long it takes */
+                walk_item(table, node, type->side[s].node, 3, item + s + 1, place);
             else
-                table->start[lowest + 1]++;
-        }
+                walk_item(table, node, type->side[s].node, type->side[s].corners, item + s + 1, place);
     }
 }
 
