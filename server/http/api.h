@@ -37,6 +37,7 @@ typedef struct api {
     rates *rates;             /* NULL: it counts for this daemon alone */
     http_options options;
     transport *server;
+    uz_cache *meshes;           /* of uploads that requests have named; NULL: none are kept */
     sem_t turns;                /* so many replies may be computed at a time, the others wait: fields.c */
     pthread_mutex_t told_lock;  /* the next; taken before the store's and the workers' own */
     told_text told[TOLD_TEXTS]; /* of change n at n % TOLD_TEXTS */

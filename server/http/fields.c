@@ -43,7 +43,8 @@ bool fields_open(field_reader *reader, api *context, const http_request *rq, con
         reply_store_failure(context, status, reply);
         return false;
     }
-    reader->is_open = codec_decode(&reader->request, CODEC_STORED, body, len, context->store, &problem);
+    reader->is_open =
+        codec_decode_kept(&reader->request, CODEC_STORED, body, len, context->store, context->meshes, &problem);
     free(body);
     if (!reader->is_open) {
         reply_problem(reply, &problem);

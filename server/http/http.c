@@ -72,9 +72,13 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
 
 /* ---- start to stop */
 
+/* A mesh of two million tetrahedra. A request that names its file again is checked without reading it. */
+#define MESHES_KEPT ((size_t)128 << 20)
+
 static void free_context(api *context)
 {
     rates_stop(context->rates);
+    uz_cache_free(context->meshes);
     sem_destroy(&context->turns);
     for (size_t i = 0; i < TOLD_TEXTS; i++)
         free(context->told[i].data);
@@ -103,6 +107,7 @@ bool http_start(http_server *out, int listen_fd, const http_parts *parts, const 
     context->metrics = parts->metrics;
     context->auth = parts->auth;
     context->options = *options;
+    context->meshes = uz_cache_new(MESHES_KEPT);
     pthread_mutex_init(&context->ready_lock, NULL);
     pthread_mutex_init(&context->told_lock, NULL);
     sem_init(&context->turns, 0, (unsigned)work_settings(parts->work)->workers);

@@ -256,7 +256,8 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     if (!good)
         REFUSE_PARAMETER(&problem, "validate must be true or false");
     good = good && read_key(rq, &key, &problem) &&
-           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
+           codec_decode_kept(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store,
+                             context->meshes, &problem) &&
            check_uploads(context, rq, &request, &problem) && check_start(context, &request, rq, &problem) &&
            check_allowed(context, rq, request.webhook, request.priority, &problem);
     char *mistakes = !good && validate_only ? codec_mistakes(rq->body ? rq->body : "", rq->body_len) : NULL;
