@@ -305,12 +305,10 @@ class Service:
         """Process ids of those that solve, and live."""
         found = []
         for task in os.listdir(f"/proc/{self.process.pid}/task"):
-            try:
+            with contextlib.suppress(OSError):  # the thread has ended
                 with open(f"/proc/{self.process.pid}/task/{task}/children", encoding="ascii") as file:
                     found += [int(word) for word in file.read().split()]
-            except OSError:  # the thread has ended
-                pass
-        return [pid for pid in found if pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"]
+        return [pid for pid in found if is_alive(pid)]
 
     # ---- requests
 
@@ -374,6 +372,13 @@ class Service:
             except OSError:
                 pass  # the server may have answered and closed already
             return read_all(connection)
+
+
+def is_alive(pid):
+    """Neither gone nor waiting for its parent to be told."""
+    with contextlib.suppress(OSError):
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    return False
 
 
 def read_all(connection):
