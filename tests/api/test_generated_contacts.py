@@ -1,6 +1,5 @@
 """Some generated scenes of bodies that touch, in all their variations but refined; `make extremes` looks at a thousand."""
-# not under ThreadSanitizer: about answers, not about threads
-# in the ordinary build too: answers as the optimizer has them, of all kinds of elements
+# not under sanitizers: answers as the optimizer has them, of all kinds of elements
 import pathlib
 import sys
 

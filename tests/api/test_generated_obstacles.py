@@ -1,7 +1,6 @@
 """Some generated bodies on rigid obstacles, mirrored, turned and in other units; the
 generator makes as many as are asked for: `tests/extremes/generated_obstacles.py BUILD OUT.json COUNT`."""
-# not under ThreadSanitizer: about answers, not about threads
-# in the ordinary build too: answers as the optimizer has them, of all kinds of elements
+# not under sanitizers: answers as the optimizer has them, of all kinds of elements
 import math
 import pathlib
 import sys

@@ -1,6 +1,5 @@
 """Some generated scenes in other words; python3 tests/extremes/generated_words.py has as many as are asked for."""
-# not under ThreadSanitizer: about answers, not about threads
-# in the ordinary build too: answers as the optimizer has them, of all kinds of elements
+# not under sanitizers: answers as the optimizer has them, of all kinds of elements
 import pathlib
 import random
 import sys
