@@ -124,9 +124,8 @@ static bool read_file(uz_given_mesh *to, decoding *d, const char *format, const 
         return false;
     /* Of an upload by its file alone: one that a shorter request may not read could not be kept for it. */
     const size_t bound = (file.digest ? (size_t)64 << 20 : d->bound) + 32 * file.len;
-    const bool good =
-        (file.digest ? uz_mesh_read_kept(to, d->meshes, file.digest, format, file.data, file.len, bound, &err)
-                     : uz_mesh_read(to, format, file.data, file.len, bound, &err)) == UZ_OK;
+    const bool good = uz_mesh_read_kept(to, file.digest ? d->meshes : NULL, file.digest, format, file.data, file.len,
+                                        bound, &err) == UZ_OK;
     decode_source_close(&file);
     snprintf(err.where, sizeof err.where, "/mesh/%s", format);
     if (!good) {

@@ -72,7 +72,7 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
 
 /* ---- start to stop */
 
-/* A mesh of two million tetrahedra. A request that names its file again is checked without reading it. */
+/* A mesh of two million tetrahedra. A request that names its file again is checked by this one. */
 #define MESHES_KEPT ((size_t)128 << 20)
 
 static void free_context(api *context)

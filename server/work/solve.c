@@ -148,7 +148,7 @@ bool solve_predict(uz_prediction *out, const solve_with *with, char *body, size_
     codec_request request = {0};
     problem_details ignored = {0};
     uz_error err = {.status = UZ_OK};
-    bool known = codec_decode(&request, CODEC_STORED, body, body_len, with->source, &ignored);
+    bool known = codec_decode_kept(&request, CODEC_STORED, body, body_len, with->source, with->cache, &ignored);
     free(body);
     request.settings.memory_limit = with->memory_limit;
     known = known && !request.settings.semidefinite && !request.problem.scene.refine &&
