@@ -30,11 +30,7 @@ void uz_nodal_places(const int64_t *place[UZ_STRAIN_LANES], const uz_nodal_strai
                      const uz_strain_group *group, const uz_mesh *mesh);
 
 /* Of estimates of the mesh's error (error_estimate.c): the rule by which strains are compared with their means at
- * nodes, exact of the standard formulation, ... */
+ * nodes, exact of the standard formulation. */
 void uz_energy_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
-/* ... and the squared error in parts of the squared difference, which hides a part of it (stress_lanes.c). One number
- * for each lane. */
-void uz_whole_difference(uz_lanes *times, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES],
-                         const uz_nodal_strains *nodal);
 
 #endif

@@ -1,6 +1,5 @@
 #include "assembly/stress_lanes.h"
 
-#include "assembly/nodal_strains.h"
 #include "core/cpu.h"
 
 #include <string.h>
@@ -170,20 +169,14 @@ UZ_INLINE void find_whole(uz_lanes *times, const uz_strain_group *g, const uz_la
         *times *= HIDDEN;
 }
 
-static void find_whole_of_rows(uz_lanes *times, const double *rows, int size, const uz_strain_group *g,
-                               const int64_t *const place[LANES])
+void uz_whole_difference(uz_lanes *times, const double *rows, int size, const uz_strain_group *group,
+                         const int64_t *const place[UZ_STRAIN_LANES])
 {
     uz_lanes around[NODES];
-    for (int a = 0; a < g->rule.nodes; a++)
+    for (int a = 0; a < group->rule.nodes; a++)
         for (int l = 0; l < LANES; l++)
-            around[a][l] = rows[place[l][a] * size + g->rule.stresses];
-    find_whole(times, g, around, g->rule.nodes);
-}
-
-void uz_whole_difference(uz_lanes *times, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES],
-                         const uz_nodal_strains *nodal)
-{
-    find_whole_of_rows(times, nodal->rows, nodal->size, group, place);
+            around[a][l] = rows[place[l][a] * size + group->rule.stresses];
+    find_whole(times, group, around, group->rule.nodes);
 }
 
 /* ---- comparison */
@@ -378,7 +371,7 @@ static void compare_each(uz_stress_sums *sums, const double *rows, const uz_stra
     const int n = g->rule.stresses;
     uz_lanes times = (uz_lanes){0} + 1;
     if (sums->hidden)
-        find_whole_of_rows(&times, rows, size, g, place);
+        uz_whole_difference(&times, rows, size, g, place);
     if (sums->steepness)
         find_steepest(&sums->steep2, g, g->rule.nodes, g->rule.dim);
     for (int l = 0; l < g->count; l++) {

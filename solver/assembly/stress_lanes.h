@@ -10,6 +10,10 @@
  * NULL: the linear function of the place that fits them best, which they must determine. */
 void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
                         const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES]);
+/* The squared error in parts of the squared difference of strains and their means at nodes, which hides a part of it;
+ * rows: with the volumes at nodes behind what is compared. One number for each lane. */
+void uz_whole_difference(uz_lanes *times, const double *rows, int size, const uz_strain_group *group,
+                         const int64_t *const place[UZ_STRAIN_LANES]);
 /* Integrals over elements. */
 typedef struct {
     bool hidden;     /* given: eta2 has also what is hidden in the difference (uz_whole_difference) */

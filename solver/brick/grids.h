@@ -41,6 +41,9 @@ void uz_brick_cycle(const uz_brick_grids *mg, const uz_multigrid_room *room, int
  * 0 of what is 0 or has numbers that are none. */
 double uz_brick_read(const uz_brick_grids *mg, const uz_multigrid_room *room, const double *r);
 
+/* direction = z + beta direction (n each), by all threads. */
+void uz_brick_turn(float *direction, const float *z, float beta, int64_t n);
+
 /* As uz_multigrid_kind says. */
 uz_status uz_brick_step_roughly(const uz_multigrid *base, uz_multigrid_room *room, const double *r, uz_cg_visit visit,
                                 void *ctx, uz_error *err);

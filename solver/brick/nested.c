@@ -143,10 +143,11 @@ static double precondition(const nested *x, int l)
     return uz_long_dot_single(n, x->r, x->room->v[l].x);
 }
 
-/* Steps on a grid as the threads that share its vectors see them. */
+/* A step on a grid as the threads that share its vectors see it. */
 typedef struct {
-    const float *z;
-    float *u, *r, *direction, *q, factor;
+    float *u, *r;
+    const float *direction, *q;
+    float factor;
 } steps;
 
 static void step(void *ctx, int64_t begin, int64_t end)
@@ -160,28 +161,19 @@ static void step(void *ctx, int64_t begin, int64_t end)
     }
 }
 
-static void turn(void *ctx, int64_t begin, int64_t end)
-{
-    const steps *s = ctx;
-    const float beta = s->factor, *restrict z = s->z;
-    float *restrict direction = s->direction;
-    for (int64_t i = begin; i < end; i++)
-        direction[i] = z[i] + beta * direction[i];
-}
-
 /* Conjugate gradients on the dofs that are not held; r: the residual there. */
 static void iterate(nested *x, int l)
 {
     const int64_t n = x->mg->level[l].axes * x->mg->level[l].size;
-    const float *inverse = x->room->held[l];
-    steps s = {x->room->v[l].x, x->grid[l].u, x->r, x->direction, x->q, 0.0F};
+    const float *inverse = x->room->held[l], *z = x->room->v[l].x;
+    steps s = {x->grid[l].u, x->r, x->direction, x->q, 0.0F};
     const uz_brick_vectors v = {.x = x->direction, .b = x->zero, .t = x->q, .d = x->q, .inverse = inverse};
     for (int64_t i = 0; i < n; i++)
         x->r[i] = inverse[i] != 0.0F ? x->r[i] : 0.0F;
     double square = precondition(x, l);
     x->energy = fmax(x->energy, sqrt(fmax(0.0, square)));
     const double goal = (x->mg->level[l].axes == 2 ? AS_GOOD_IN_A_PLANE : AS_GOOD_AS_A_GRID) * x->energy;
-    memcpy(x->direction, s.z, (size_t)n * sizeof(float));
+    memcpy(x->direction, z, (size_t)n * sizeof(float));
     for (int k = 0; k < ITERATIONS_MOST && square > goal * goal; k++) {
         uz_brick_residual(&x->mg->level[l], &v, &x->room->planes); /* q = -K direction */
         const double curvature = -uz_long_dot_single(n, x->direction, x->q), before = square;
@@ -190,8 +182,7 @@ static void iterate(nested *x, int l)
         s.factor = (float)(square / curvature);
         uz_by_pieces(step, &s, n);
         square = precondition(x, l);
-        s.factor = (float)(square / before);
-        uz_by_pieces(turn, &s, n);
+        uz_brick_turn(x->direction, z, (float)(square / before), n);
     }
 }
 

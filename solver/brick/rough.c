@@ -27,13 +27,24 @@ static void reduce_residual(void *ctx, int64_t begin, int64_t end)
         r[i] -= alpha * q[i];
 }
 
-static void turn_direction(void *ctx, int64_t begin, int64_t end)
+typedef struct {
+    float *direction;
+    const float *z;
+    float beta;
+} turning;
+
+static void turn(void *ctx, int64_t begin, int64_t end)
 {
-    const rough *s = ctx;
-    const float beta = s->factor, *restrict z = s->v->x;
-    float *restrict p = s->direction;
+    const turning *x = ctx;
+    const float beta = x->beta, *restrict z = x->z;
+    float *restrict p = x->direction;
     for (int64_t i = begin; i < end; i++)
         p[i] = z[i] + beta * p[i];
+}
+
+void uz_brick_turn(float *direction, const float *z, float beta, int64_t n)
+{
+    uz_by_pieces(turn, &(turning){direction, z, beta}, n);
 }
 
 /* Steps from room->v[0].b on; unit: of r'M^-1 r. */
@@ -56,8 +67,7 @@ static void take_steps(rough *s, const uz_brick_grids *mg, const uz_multigrid_ro
         uz_brick_cycle(mg, room, 0);
         square = uz_long_dot_single(n, s->v->b, s->v->x);
         go_on = visit(ctx, along, unit * before, unit * square);
-        s->factor = (float)(square / before);
-        uz_by_pieces(turn_direction, s, n);
+        uz_brick_turn(s->direction, s->v->x, (float)(square / before), n);
     }
 }
 

@@ -8,6 +8,7 @@
 #include "dual/sparse.h"
 
 #include "core/alloc.h"
+#include "core/order.h"
 #include "law/sign.h"
 
 #include <math.h>
@@ -24,18 +25,11 @@ typedef struct {
     int64_t n, n_pairs, pulling, pressing;
 } band;
 
-/* The place of a dof at or after `from`, -1: it has no bounds. */
-static int64_t place_of(const uz_bounded *box, int64_t from, int64_t dof)
+/* The place of a dof, -1: it has no bounds. */
+static int64_t place_of(const uz_bounded *box, int64_t dof)
 {
-    int64_t low = from, high = box->n;
-    while (low < high) {
-        const int64_t middle = (low + high) / 2;
-        if (box->dof[middle] < dof)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < box->n && box->dof[low] == dof ? low : -1;
+    const int64_t place = uz_order_seek(box->dof, NULL, box->n, dof);
+    return place < box->n && box->dof[place] == dof ? place : -1;
 }
 
 static bool find_pairs(band *x, const uz_csc *K)
@@ -44,7 +38,7 @@ static bool find_pairs(band *x, const uz_csc *K)
     for (int64_t b = 0; b < x->n; b++) {
         const int64_t j = x->box->dof[b];
         for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
-            const int64_t other = place_of(x->box, b + 1, K->idx[k]);
+            const int64_t other = place_of(x->box, K->idx[k]);
             if (other < 0)
                 continue;
             if (!uz_grow(&x->pair, x->n_pairs, 1, &room, sizeof *x->pair))

@@ -13,6 +13,7 @@
 #include "finite/mesh_error.h"
 
 #include "assembly/nodal_strains.h"
+#include "assembly/stress_lanes.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "finite/finite_body.h"
@@ -164,7 +165,7 @@ static void compare(void *ctx, const uz_strain_group *group)
     uz_nodal_places(place, &x->nodal, group, &x->model->mesh);
     uz_lanes times = (uz_lanes){0} + 1;
     if (x->whole)
-        uz_whole_difference(&times, group, place, &x->nodal);
+        uz_whole_difference(&times, x->nodal.rows, x->nodal.size, group, place);
     for (int k = 0; k < 2 && x->to; k++) {
         x->moved[k] = *group;
         uz_strain_group_load(&x->moved[k], &x->to[k]);

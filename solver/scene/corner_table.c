@@ -28,7 +28,7 @@ static const int *list_corners(int *count, const int64_t **node, const uz_mesh *
     return item.side < 0 ? ALL : type->side[item.side].node;
 }
 
-static int64_t lowest_corner(const int64_t *node, const int *local, int count)
+UZ_INLINE int64_t lowest_corner(const int64_t *node, const int *local, int count)
 {
     int64_t lowest = node[local[0]];
     for (int i = 1; i < count; i++)
@@ -111,9 +111,7 @@ static int compare_elements(const void *a, const void *b)
 UZ_INLINE void walk_item(uz_corner_table *table, const int64_t *node, const int *local, int count, int64_t item,
                          bool place)
 {
-    int64_t lowest = node[local[0]];
-    for (int i = 1; i < count; i++)
-        lowest = node[local[i]] < lowest ? node[local[i]] : lowest;
+    const int64_t lowest = lowest_corner(node, local, count);
     if (place)
         table->item[table->start[lowest]++] = item;
     else
