@@ -171,14 +171,11 @@ static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *
 static uz_status choose_rows(uz_setup *setup, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
 {
     const uz_body_model *model = &setup->model;
-    uz_scene unloaded = *scene;
-    unloaded.loads = NULL;
-    unloaded.n_loads = 0;
-    double *p = uz_alloc(model->d, sizeof *p), *h = uz_alloc(model->m, sizeof *h);
+    double *p = model->place ? uz_alloc(model->d, sizeof *p) : NULL, *h = uz_alloc(model->m, sizeof *h);
     uz_error refusal = {0};
     uz_status status = UZ_ERR_MEMORY;
-    if (p && h)
-        status = uz_body_model_load(p, h, NULL, model, &unloaded, &refusal);
+    if (h && (p || !model->place))
+        status = uz_body_model_gaps(h, model, scene, &refusal);
     if (status == UZ_OK && model->place) { /* the gaps there */
         uz_restrict_nodal(p, model, model->place);
         uz_csc_gaxpy(h, &model->N, -1, p);
