@@ -176,7 +176,8 @@ uz_status uz_list_parts(uz_parts *parts, const uz_mesh *mesh, uz_error *err)
             parts->list[i].low[c] = DBL_MAX;
             parts->list[i].high[c] = -DBL_MAX;
         }
-    for (int64_t a = mesh->n_nodes - 1; a >= 0; a--) {
+    const int64_t step = mesh->uniform && mesh->n_nodes > 1 ? mesh->n_nodes - 1 : 1; /* a box has its corners */
+    for (int64_t a = mesh->n_nodes - 1; a >= 0; a -= step) {
         uz_part *p = &parts->list[parts->of[a]];
         p->node = a;
         uz_part_reach(p, mesh, a);

@@ -380,21 +380,24 @@ double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double 
     return sum.hi + sum.lo;
 }
 
+static int64_t terms_of_column(const uz_csc *A, int64_t j)
+{
+    return A->ptr ? A->ptr[j + 1] - A->ptr[j] : 0;
+}
+
 /* Sums of rows as columns of K and N count them. */
 typedef struct {
     const uz_csc *K, *N;
-    const uz_brick *brick;
     int64_t *count;
 } counting;
 
 static void count_terms(void *ctx, int64_t begin, int64_t end)
 {
     const counting *x = ctx;
-    const uz_csc *K = x->K, *N = x->N;
+    const uz_csc *K = x->K;
     int64_t *count = x->count;
     for (int64_t j = begin; j < end; j++) {
-        const int64_t own = x->brick ? x->brick->axes << 2 * x->brick->axes : K->ptr[j + 1] - K->ptr[j];
-        count[j] += own + (N->ptr ? N->ptr[j + 1] - N->ptr[j] : 0);
+        count[j] += terms_of_column(K, j) + terms_of_column(x->N, j);
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
             count[K->idx[k]] += K->idx[k] != j;
     }
@@ -402,13 +405,17 @@ static void count_terms(void *ctx, int64_t begin, int64_t end)
 
 int64_t uz_most_terms(const uz_csc *K, const uz_brick *brick, const uz_csc *N)
 {
-    const int64_t room = K->rows > N->rows ? K->rows : N->rows;
+    const int64_t rows = brick ? 0 : K->rows, room = rows > N->rows ? rows : N->rows;
+    const int64_t of_cells = brick ? brick->axes << 2 * brick->axes : 0; /* of each corner all that its cell has */
     int64_t most = 1, *count = uz_alloc_zero(room, sizeof *count);
     if (!count)
         return -1;
-    uz_by_columns(count_terms, &(counting){K, N, brick, count}, K);
-    for (int64_t j = 0; j < K->cols; j++)
-        most = count[j] + 2 > most ? count[j] + 2 : most; /* p and K c */
+    if (!brick)
+        uz_by_columns(count_terms, &(counting){K, N, count}, K);
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t own = brick ? of_cells + terms_of_column(N, j) : count[j];
+        most = own + 2 > most ? own + 2 : most; /* p and K c */
+    }
     memset(count, 0, (size_t)room * sizeof *count);
     for (int64_t k = 0; N->ptr && k < N->ptr[N->cols]; k++)
         most = 2 * ++count[N->idx[k]] + 1 > most ? 2 * count[N->idx[k]] + 1 : most;
