@@ -278,10 +278,10 @@ static size_t reserve_share(size_t cache_bytes)
     return share < RESERVE_MOST ? share : RESERVE_MOST;
 }
 
-/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
- * freed stays in the heap (memory_keep_heap): where much lies free there, all of it goes back to the system; where
- * little and a body may come, so much is touched now, in huge pages. Returns the milliseconds until it is to be done
- * again, -1: never. */
+/* What jobs need to know of the machine is measured, once, and memory for the next body touched while nobody waits for
+ * it; memory is given back when no job has run for long. What is freed stays in the heap (memory_keep_heap): where
+ * much lies free there, all of it goes back to the system; where little and a body may come, so much is touched now, in
+ * huge pages. Returns the milliseconds until it is to be done again, -1: never. */
 static int make_ready(solver *s)
 {
     struct pollfd socket = {.fd = s->socket, .events = POLLIN};
@@ -290,6 +290,7 @@ static int make_ready(solver *s)
         malloc_trim(0);
         return -1;
     }
+    uz_process_measure();
     while (poll(&socket, 1, 0) == 0 && uz_reserve_fill(s->reserve))
         ;
     /* bodies are solved here, those without a factor in the heap */

@@ -145,6 +145,9 @@ void uz_process_threads_now(int threads);
 /* Starts the threads of solves, and lets BLAS allocate now what it works in, for each of its threads: later, where
  * memory has ended, it would try for ever. */
 void uz_process_warm(void);
+/* Measures now what predictions and the choice of an operator need to know of the machine, some 15 ms once in a
+ * process: else the first solve that needs it does. */
+void uz_process_measure(void);
 /* After it, at most once: factors are made in the reserve, which has to outlive them. */
 void uz_process_reserve(uz_reserve *reserve);
 /* Per-thread cure for CHOLMOD's compiled-in OpenMP team (4 threads whatever the machine has). */

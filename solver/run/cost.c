@@ -105,17 +105,24 @@ static void measure_plane_cells(void)
     of_cells[1] = uz_brick_rate(2);
 }
 
-/* Only who may take a multigrid waits for its rate. brick: NULL where there is a matrix. */
-static double cycle_rate(const uz_brick *brick)
+/* Only who may take a multigrid waits for its rate. axes: of a brick; 0 where there is a matrix. */
+static double cycle_rate(int axes)
 {
     static pthread_once_t sweeps = PTHREAD_ONCE_INIT, solid = PTHREAD_ONCE_INIT, plane = PTHREAD_ONCE_INIT;
-    if (!brick) {
+    if (axes == 0) {
         pthread_once(&sweeps, measure_sweeps);
         return of_sweeps;
     }
-    const bool flat = brick->axes == 2;
+    const bool flat = axes == 2;
     pthread_once(flat ? &plane : &solid, flat ? measure_plane_cells : measure_solid_cells);
     return of_cells[flat];
+}
+
+void uz_cost_measure(void)
+{
+    (void)uz_cost_machine();
+    for (int axes = 0; axes <= 3; axes += axes == 0 ? 2 : 1)
+        (void)cycle_rate(axes);
 }
 
 /* Beyond what a core has for itself entries come from memory: their rate is that of K, which is there. From so many
@@ -292,7 +299,7 @@ uz_cost_size uz_cost_size_of(const uz_csc *K, const uz_csc *N, const uz_body_mod
                           .firmness = shaped ? find_firmness(scene, &model->mesh, brick) : 1.0,
                           .irregular = solid && !brick && is_irregular(&model->mesh),
                           .entry_s = brick ? 0.0 : rate_of(K),
-                          .cycle_s = brick || is_large(K) ? cycle_rate(brick) : 0.0,
+                          .cycle_s = brick || is_large(K) ? cycle_rate(brick ? brick->axes : 0) : 0.0,
                           .cases = cases};
 }
 

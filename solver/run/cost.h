@@ -21,6 +21,8 @@ typedef struct {
 
 /* The rates of this machine; measured when they are asked for first. */
 const uz_cost_rates *uz_cost_machine(void);
+/* All that is measured of it but for what is of a matrix. */
+void uz_cost_measure(void);
 
 /* Of K (of a brick it is not read) and of N, whose rows touch n_b dofs, for so many load cases. model, scene: NULL of
  * matrices. An active set solves with the free dofs only where each row has one entry, unless gradient steps were asked

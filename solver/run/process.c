@@ -6,6 +6,7 @@
 #include "core/reserve.h"
 #include "factor/factor.h"
 #include "linalg/blas.h"
+#include "run/cost.h"
 
 #include <signal.h>
 
@@ -48,6 +49,11 @@ void uz_process_warm(void)
     openblas_set_num_threads(1);
     uz_aside_begin(threads);
     uz_free_all(Z, C);
+}
+
+void uz_process_measure(void)
+{
+    uz_cost_measure();
 }
 
 void uz_process_reserve(uz_reserve *reserve)
