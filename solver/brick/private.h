@@ -24,10 +24,11 @@ bool uz_brick_stiffness(double *ke, const uz_brick *brick, const double size[3])
  * so many planes with so many numbers together, at most `most`. A slab does what lies below it once more, which takes a
  * quarter of it at most. */
 int uz_brick_slabs(int64_t planes, int64_t numbers, int most);
-/* The first plane of a slab; that of the slab after the last one is the number of planes. */
+/* The first plane of a slab; that of the slab after the last one is the number of planes. What is over goes to those
+ * below, of which the first has nothing to do once more. */
 static inline int64_t uz_brick_slab(int64_t planes, int slab, int slabs)
 {
-    return planes * slab / slabs;
+    return (planes * slab + slabs - 1) / slabs;
 }
 
 /* K times a vector in double precision, plane by plane. One room per solve, for `most` threads. */

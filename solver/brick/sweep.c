@@ -5,12 +5,14 @@
  * smoother, with what comes before and after, pass through the vectors once (a wavefront: Wittmann, Hager and Wellein,
  * "Multicore-aware parallel temporal blocking of stencil codes for shared and distributed memory", IPDPS Workshops,
  * 2010). Threads share a sweep in slabs of planes. What a slab needs of planes beside it, it computes once more for
- * itself, with the same bits. */
+ * itself, with the same bits. Where the slab above has begun by then, which begins there, the last such planes are
+ * taken from it instead. */
 #include "brick/levels.h"
 
 #include "core/alloc.h"
 #include "core/cpu.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,6 +21,8 @@
 
 /* A slab has so many planes for each stage of a sweep, as it does planes beside it once more. */
 enum { PLANES_OF_STAGE = 4 };
+/* Planes of the stage before the last one that a slab takes from the one above: the last of its own and the next. */
+enum { HANDED = 2 };
 
 /* Stages of the longest sweep that has a slab for this part: coarser grids have no more planes. */
 static int64_t stages_of(const uz_brick_level *level, int part)
@@ -39,7 +43,7 @@ bool uz_brick_planes_init(uz_brick_planes *room, const uz_brick_level *level, si
         /* reach: planes of x and of d, below and above, where there are two slabs */
         const int64_t stages = stages_of(level, part),
                       reach = room->most < 2 ? 0 : stages_of(level, part > 0 ? part : 1),
-                      beside = reach > 0 ? 4 * reach * level->axes * level->plane + 2 * UZ_BRICK_PAD : 0;
+                      beside = reach > 0 ? (4 * reach + 1) * level->axes * level->plane + 2 * UZ_BRICK_PAD : 0;
         for (int k = 0; k < 2 * stages; k++)
             ok = (of->plane[k / 2][k % 2] = uz_alloc_zero(plane, sizeof(float))) && ok;
         ok = (of->sums = uz_alloc_zero(sums, sizeof(float))) && ok;
@@ -169,22 +173,27 @@ typedef struct {
     int stages; /* beside the first */
     bool changes, from_zero;
     int slabs;
+    atomic_bool *hands; /* of each slab: its planes for the one below can be taken */
 } sweep;
 
 typedef struct {
     const sweep *s;
     struct uz_brick_room room;
+    int part;
     int64_t begin, end; /* its planes */
+    bool spared;        /* the slab above hands it planes */
 } slab;
 
 static slab slab_of(const sweep *s, int part)
 {
     const int64_t planes = s->level->cells[2] + 1;
-    return (slab){s, s->room->of[part], uz_brick_slab(planes, part, s->slabs),
-                  uz_brick_slab(planes, part + 1, s->slabs)};
+    return (slab){
+        s,    s->room->of[part], part, uz_brick_slab(planes, part, s->slabs), uz_brick_slab(planes, part + 1, s->slabs),
+        false};
 }
 
-/* Planes that a stage has to reach, so that the last one has those of the slab. */
+/* Planes that a stage has to reach, so that the last one has those of the slab. What is handed ends the stage before
+ * that one at the last plane of the slab. */
 static int64_t lowest(const slab *own, int number)
 {
     const int64_t k = own->begin - (own->s->stages - number);
@@ -193,7 +202,8 @@ static int64_t lowest(const slab *own, int number)
 
 static int64_t highest(const slab *own, int number)
 {
-    const int64_t k = own->end - 1 + (own->s->stages - number), last = own->s->level->cells[2];
+    const int64_t spared = own->spared && number < own->s->stages ? HANDED : 0,
+                  k = own->end - 1 - spared + (own->s->stages - number), last = own->s->level->cells[2];
     return k < last ? k : last;
 }
 
@@ -210,6 +220,12 @@ static float *plane_of(int64_t *apart, const slab *own, int vector, int64_t k)
     return own->room.beside + (2 * vector * reach + place) * s->level->axes * plane;
 }
 
+static void copy_plane(const slab *own, float *to, int64_t apart_to, const float *from, int64_t apart_from)
+{
+    for (int m = 0; m < own->s->level->axes; m++)
+        memcpy(to + m * apart_to, from + m * apart_from, (size_t)own->s->level->plane * sizeof(float));
+}
+
 /* x beside the slab as it is before others change it there. */
 static void copy_beside(void *ctx, int part)
 {
@@ -218,9 +234,8 @@ static void copy_beside(void *ctx, int part)
     for (int64_t k = lowest(&own, 0); k <= highest(&own, 0); k++) {
         int64_t apart;
         float *x = plane_of(&apart, &own, 0, k);
-        for (int m = 0; (k < own.begin || k >= own.end) && m < s->level->axes; m++)
-            memcpy(x + m * apart, s->v->x + m * s->level->size + k * s->level->plane,
-                   (size_t)s->level->plane * sizeof(float));
+        if (k < own.begin || k >= own.end)
+            copy_plane(&own, x, apart, s->v->x + k * s->level->plane, s->level->size);
     }
 }
 
@@ -268,6 +283,38 @@ static void begin_plane(const slab *own, int64_t k)
         uz_brick_prolong_plane(s->level, s->next, s->v->inverse, s->coarse, own->room.line, k, x, apart);
 }
 
+/* Its first plane as the stage before the last one leaves it; that below stays as it is beside the slab. */
+static float *handed_plane(const slab *own)
+{
+    return own->room.beside + 4 * own->s->stages * own->s->level->axes * own->s->level->plane;
+}
+
+static void hand(const slab *own)
+{
+    int64_t apart;
+    const float *x = plane_of(&apart, own, 0, own->begin);
+    copy_plane(own, handed_plane(own), own->s->level->plane, x, apart);
+    atomic_store_explicit(&own->s->hands[own->part], true, memory_order_release);
+}
+
+/* When the first stage would go beyond what it has to reach of a slab that is spared the rest. */
+static void be_spared(slab *own)
+{
+    const sweep *s = own->s;
+    own->spared = own->part + 1 < s->slabs && atomic_load_explicit(&s->hands[own->part + 1], memory_order_acquire);
+    if (!own->spared)
+        return;
+    const slab above = slab_of(s, own->part + 1);
+    int64_t apart, apart_from;
+    for (int vector = 0; vector < 2; vector++) {
+        float *to = plane_of(&apart, own, vector, own->end - 1);
+        const float *from = plane_of(&apart_from, &above, vector, own->end - 1);
+        copy_plane(own, to, apart, from, apart_from);
+    }
+    float *next = plane_of(&apart, own, 0, own->end);
+    copy_plane(own, next, apart, handed_plane(&above), s->level->plane);
+}
+
 /* A stage that has come to the layer above plane k. */
 static void go_on(slab *own, int number, int64_t k)
 {
@@ -282,6 +329,8 @@ static void go_on(slab *own, int number, int64_t k)
         add_layer(own, k, sums[0], sums[1]);
     if (k >= low)
         finish_plane(own, k, sums[0], &s->of[number - 1]);
+    if (own->part > 0 && s->changes && k == own->begin && number == s->stages - 1)
+        hand(own);
     sums[0] = sums[1];
     sums[1] = done;
 }
@@ -291,6 +340,8 @@ static void sweep_slab(void *ctx, int part)
     slab own = slab_of(ctx, part);
     const int stages = own.s->stages;
     for (int64_t k = lowest(&own, 0); k < own.end + stages; k++) {
+        if (own.s->changes && k == own.end + stages - HANDED)
+            be_spared(&own);
         if (k <= highest(&own, 0))
             begin_plane(&own, k);
         for (int number = 1; number <= stages; number++)
@@ -301,6 +352,8 @@ static void sweep_slab(void *ctx, int part)
 static void share(sweep *s)
 {
     const int64_t planes = s->level->cells[2] + 1;
+    atomic_bool hands[UZ_ASIDE_MOST] = {false};
+    s->hands = hands;
     s->slabs = uz_brick_slabs(planes, s->level->size, s->room->most);
     while (s->slabs > 1 && s->slabs * PLANES_OF_STAGE * s->stages > planes)
         s->slabs--;
