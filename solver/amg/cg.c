@@ -47,12 +47,6 @@ void uz_cg_clear(uz_cg *cg)
     memset(cg, 0, sizeof *cg);
 }
 
-static void clear_held(double *x, const uz_cg *cg)
-{
-    for (int64_t j = 0; cg->held && j < cg->n; j++)
-        x[j] = cg->held[j] ? 0.0 : x[j];
-}
-
 /* What a step does to vectors, in pieces that threads share. */
 typedef struct {
     uz_cg *cg;
@@ -60,6 +54,19 @@ typedef struct {
     const double *b;
     double factor;
 } update;
+
+static void clear_piece(void *ctx, int64_t begin, int64_t end)
+{
+    const update *u = ctx;
+    for (int64_t j = begin; j < end; j++)
+        u->x[j] = u->cg->held[j] ? 0.0 : u->x[j];
+}
+
+static void clear_held(double *x, uz_cg *cg)
+{
+    if (cg->held)
+        uz_by_pieces(clear_piece, &(update){.cg = cg, .x = x}, cg->n);
+}
 
 static void find_residual(void *ctx, int64_t begin, int64_t end)
 {

@@ -275,7 +275,7 @@ static uz_status find_most(double *most, double *power, uz_cg *cg, const uz_csc 
 {
     uz_status status = UZ_OK;
     *most = INFINITY;
-    memcpy(power, cg->r, (size_t)cg->n * sizeof *power);
+    uz_long_copy(cg->n, power, cg->r);
     for (int k = 0; status == UZ_OK && k < POWERS; k++) {
         status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, power, err);
         *most = begin_power(power, cg->z, K);

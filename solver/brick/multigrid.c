@@ -196,20 +196,36 @@ int64_t uz_brick_nearest(const uz_brick_level *level, const uz_brick_level *fine
     return (k * f[2] + n[2] / 2) / n[2] * finer->plane + y * finer->stride + (i * f[0] + n[0] / 2) / n[0];
 }
 
-/* A node of a coarser grid is held where the node of the finer one that stands there, or nearest to it, is. */
-void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer, const float *above)
+/* A coarser grid likewise. */
+typedef struct {
+    float *inverse;
+    const uz_brick_level *level, *finer;
+    const float *above;
+    int slabs;
+} next_holding;
+
+static void hold_next_slab(void *ctx, int slab)
 {
-    const int64_t *n = level->cells;
-    for (int64_t k = 0; k <= n[2]; k++)
+    const next_holding *x = ctx;
+    const uz_brick_level *level = x->level, *finer = x->finer;
+    const int64_t *n = level->cells, end = uz_brick_slab(n[2] + 1, slab + 1, x->slabs);
+    for (int64_t k = uz_brick_slab(n[2] + 1, slab, x->slabs); k < end; k++)
         for (int64_t j = 0; j <= n[1]; j++)
             for (int64_t i = 0; i <= n[0]; i++) {
                 const int cells =
                     (i > 0 && i < n[0] ? 2 : 1) * (j > 0 && j < n[1] ? 2 : 1) * (k > 0 && k < n[2] ? 2 : 1);
                 const int64_t there = uz_brick_nearest(level, finer, i, j, k);
                 for (int c = 0; c < level->axes; c++)
-                    inverse[c * level->size + k * level->plane + j * level->stride + i] =
-                        above[c * finer->size + there] != 0.0F ? 1.0F / ((float)cells * level->diagonal[c]) : 0.0F;
+                    x->inverse[c * level->size + k * level->plane + j * level->stride + i] =
+                        x->above[c * finer->size + there] != 0.0F ? 1.0F / ((float)cells * level->diagonal[c]) : 0.0F;
             }
+}
+
+/* A node of a coarser grid is held where the node of the finer one that stands there, or nearest to it, is. */
+void uz_brick_next_inverse(float *inverse, const uz_brick_level *level, const uz_brick_level *finer, const float *above)
+{
+    next_holding x = {inverse, level, finer, above, uz_brick_slabs(level->cells[2] + 1, level->size, UZ_ASIDE_MOST)};
+    uz_aside_share(hold_next_slab, &x, x.slabs);
 }
 
 /* Where the dofs of the last grid stand in its vectors, by the order of these; returns how many. */

@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* The vectors of the first grid: z = M^-1 r in x, r in b, and q = K p in t where the cycle has its directions; the
  * direction p of the steps. */
@@ -56,7 +55,7 @@ static void take_steps(rough *s, const uz_brick_grids *mg, const uz_multigrid_ro
     const int64_t n = level->axes * level->size;
     uz_brick_cycle(mg, room, 0);
     double square = uz_long_dot_single(n, s->v->b, s->v->x);
-    memcpy(s->direction, s->v->x, (size_t)n * sizeof(float));
+    uz_brick_turn(s->direction, s->v->x, 0.0F, n); /* from 0 */
     for (bool go_on = true; go_on && square > 0.0;) {
         const double curvature = uz_brick_curvature(level, &product, &room->planes), before = square,
                      along = curvature > 0.0 ? before / curvature : 0.0;
