@@ -16,19 +16,16 @@ static bool leave_out_zeros(uz_dual *dual)
 {
     uz_csc *out = &((uz_sparse *)dual)->touched;
     const uz_csc *N = &dual->N;
-    *out = (uz_csc){.rows = N->rows, .idx = N->idx, .val = N->val};
-    for (int64_t j = 0; j < N->cols; j++)
-        out->cols += N->ptr[j + 1] > N->ptr[j];
-    out->ptr = uz_alloc(out->cols + 1, sizeof *out->ptr);
+    const int64_t entries = N->ptr[N->cols], most = entries < N->cols ? entries : N->cols;
+    *out = (uz_csc){.rows = N->rows, .idx = N->idx, .val = N->val, .ptr = uz_alloc(most + 1, sizeof *out->ptr)};
     if (!out->ptr)
         return false;
-    int64_t at = 0;
     out->ptr[0] = 0;
     for (int64_t j = 0; j < N->cols; j++)
         if (N->ptr[j + 1] > N->ptr[j])
-            out->ptr[++at] = N->ptr[j + 1];
+            out->ptr[++out->cols] = N->ptr[j + 1];
     dual->touched = out;
-    dual->bytes += 8 * (size_t)(out->cols + 1);
+    dual->bytes += 8 * (size_t)(most + 1);
     return true;
 }
 
@@ -140,11 +137,11 @@ void uz_sparse_multiply(const uz_dual_load *load, double *y, const double *x)
 /* c'K c, where few entries of c (d) are not 0; room (d). */
 static double correction_energy(const uz_dual_load *load, const double *c, double *room)
 {
-    const uz_csc *K = load->K;
+    const uz_csc *K = load->K, *Nt = &load->dual->Nt;
     double square = 0.0;
     bool any = false;
-    for (int64_t j = 0; j < K->cols && !any; j++)
-        any = c[j] != 0.0;
+    for (int64_t q = 0; q < Nt->ptr[Nt->cols] && !any; q++) /* it is 0 elsewhere */
+        any = c[Nt->idx[q]] != 0.0;
     if (any && !uz_sparse_has_entries(load->dual)) {
         uz_sparse_multiply(load, room, c);
         square = uz_long_dot(K->cols, c, room);
@@ -176,7 +173,8 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     double *c = x->load.correction, *Nc = x->work, complementarity = 0.0, scale = 0.0;
     if (isinf(x->slack))
         return UZ_OK;
-    memset(c, 0, (size_t)dual->d * sizeof *c);
+    for (int64_t q = 0; q < Nt->ptr[Nt->cols]; q++) /* others never get anything */
+        c[Nt->idx[q]] = 0.0;
     for (int64_t i = 0; i < dual->m; i++)
         if (close[i] || uz_gap_penetrates(g[i]))
             scale = fmax(scale, fabs(g[i]));
@@ -211,6 +209,25 @@ uz_status uz_sparse_correct(uz_dual_load *load, double *bound2, const double *r,
     return UZ_OK;
 }
 
+typedef struct {
+    const uz_sparse_load *x;
+    double *u;
+} recovery;
+
+static void add_response(void *ctx, int64_t begin, int64_t end)
+{
+    const recovery *to = ctx;
+    for (int64_t j = begin; j < end; j++)
+        to->u[j] = to->x->base[j] + to->x->response[j];
+}
+
+static void add_kept(void *ctx, int64_t begin, int64_t end)
+{
+    const recovery *to = ctx;
+    for (int64_t j = begin; j < end; j++)
+        to->u[j] += to->x->load.kept[j];
+}
+
 uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
     uz_sparse_load *x = (uz_sparse_load *)load;
@@ -224,10 +241,9 @@ uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool
         uz_long_copy(d, u, x->known_u);
     } else {
         status = load->dual->form->apply(load, x->work, r, err);
-        for (int64_t j = 0; j < d; j++)
-            u[j] = x->base[j] + x->response[j];
+        uz_by_pieces(add_response, &(recovery){x, u}, d);
     }
-    for (int64_t j = 0; corrected && j < d; j++)
-        u[j] += load->kept[j];
+    if (corrected)
+        uz_by_pieces(add_kept, &(recovery){x, u}, d);
     return status;
 }
