@@ -675,9 +675,9 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
 #define WEAK 0.1
 
 /* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->z. *right: no row is
- * seen to be wrong. */
-static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, double *g, const bool *active,
-                                 double tolerance, bool guessed, double norm, uz_error *err)
+ * seen to be wrong; *agree false: rows contradict each other. */
+static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, bool *agree, double *g,
+                                 const bool *active, double tolerance, bool guessed, double norm, uz_error *err)
 {
     uz_dual_load *load = &x->sparse.load;
     const uz_dual *dual = load->dual;
@@ -705,9 +705,11 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     memcpy(g, load->h, (size_t)dual->m * sizeof *g);
     uz_csc_gaxpy(g, &dual->N, -1.0, x->u);
     *right = info.met;
-    for (int64_t i = 0; i < dual->m; i++) {
+    for (int64_t i = 0; i < dual->m; i++)
         if (uz_reaction_pulls(x->r[i]) && fabs(x->r[i]) <= WEAK * tolerance * largest)
             x->r[i] = 0.0;
+    *agree = uz_projected_release(part, load->equations ? NULL : x->r, load->h, g); /* these bear anything */
+    for (int64_t i = 0; i < dual->m; i++) {
         g[i] = active[i] ? 0.0 : g[i];
         *right = *right && !(active[i] ? uz_reaction_pulls(x->r[i]) : uz_gap_penetrates(g[i]));
     }
@@ -715,7 +717,7 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     return status;
 }
 
-/* Rows of many entries. *solved false: they depend on each other, or there were too many guesses. */
+/* Rows of many entries. *solved false: they contradict each other, or there were too many guesses. */
 static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *active, uz_error *err)
 {
     uz_dual_load *load = &x->sparse.load;
@@ -723,6 +725,7 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
     const double least = ACTIVE_FLOOR * x->aim, most = uz_root(-2.0 * load->psi0);
     double tolerance = fmax(least, x->coarse);
     uz_projected *part = NULL;
+    bool agree = true;
     *solved = false;
     if (!x->u) {
         x->u = uz_alloc(dual->d, sizeof *x->u);
@@ -740,16 +743,16 @@ static uz_status solve_rows(free_load *x, bool *solved, double *g, const bool *a
     for (bool right = true; status == UZ_OK && right; tolerance = least) {
         uz_sparse_multiply(load, x->cg.z, x->u);
         const double norm = fmin(uz_root(uz_long_dot(dual->d, x->u, x->cg.z)), most > 0.0 ? most : INFINITY);
-        status = solve_projected(x, part, &right, g, active, tolerance, tolerance > least, norm, err);
+        status = solve_projected(x, part, &right, &agree, g, active, tolerance, tolerance > least, norm, err);
         right = right && tolerance > least;
     }
-    if (status == UZ_OK && may_bound(x, x->r))
+    if (status == UZ_OK && agree && may_bound(x, x->r))
         status = measure_slack(x, x->cg.z, err);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
     const size_t bytes = uz_projected_bytes(part) + 8 * (size_t)(dual->d + dual->m);
     load->most = bytes > load->most ? bytes : load->most;
     uz_projected_free(part);
-    *solved = status == UZ_OK;
+    *solved = status == UZ_OK && agree;
     return status;
 }
 

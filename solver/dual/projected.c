@@ -6,6 +6,8 @@
 #include "core/order.h"
 #include "linalg/linalg.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,6 +21,7 @@ struct uz_projected {
     uz_factor_workspace *ws;
     double *b, *y, *room; /* n each */
     double *e;            /* d */
+    bool softened;
     size_t bytes;
 };
 
@@ -80,18 +83,34 @@ static uz_status make_matrix(uz_csc *G, const uz_projected *x, uz_error *err)
     return status;
 }
 
-static uz_status factor_rows(uz_projected *x, bool *independent, const uz_hooks *hooks, uz_error *err)
+/* Where rows depend on each other, as those of two sides that an obstacle touches beside their common edge, this share
+ * of its diagonal is added to G: what they agree on is closed but for the share, and reactions are of the least squares
+ * among those that do the same. */
+#define SOFTENED 1e-10
+
+static void soften(uz_csc *G)
+{
+    for (int64_t k = 0; k < G->cols; k++)
+        G->val[G->ptr[k]] *= 1.0 + SOFTENED;
+}
+
+static uz_status factor_rows(uz_projected *x, bool *usable, const uz_hooks *hooks, uz_error *err)
 {
     uz_csc G = {0};
     uz_analysis *analysis = NULL;
     uz_error inner = {0};
     uz_status status = make_matrix(&G, x, err);
-    *independent = true;
+    *usable = true;
     if (status == UZ_OK)
         status = uz_analysis_create(&analysis, &G, NULL, 0, 0, UZ_ORDERING_AMD, hooks, err);
     if (status == UZ_OK) {
         status = uz_factor_create(&x->factor, &G, analysis, 0, hooks, &inner);
-        *independent = status != UZ_ERR_NOT_SPD;
+        x->softened = status == UZ_ERR_NOT_SPD;
+        if (x->softened) {
+            soften(&G);
+            status = uz_factor_create(&x->factor, &G, analysis, 0, hooks, &inner);
+        }
+        *usable = status != UZ_ERR_NOT_SPD; /* else a row is 0, or no number */
         if (status == UZ_ERR_NOT_SPD)
             status = UZ_OK;
         else if (status != UZ_OK)
@@ -184,7 +203,7 @@ uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const 
                               const bool *active, const uz_hooks *hooks, uz_error *err)
 {
     uz_projected *x = uz_alloc_zero(1, sizeof *x);
-    bool independent = true;
+    bool usable = true;
     *out = NULL;
     if (!x)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for rows as equations");
@@ -208,8 +227,8 @@ uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const 
             x->row[k++] = i;
     x->bytes = sizeof *x + 32 * (size_t)x->n + 8 * (size_t)mg->n;
     if (status == UZ_OK && x->n > 0)
-        status = factor_rows(x, &independent, hooks, err);
-    if (status == UZ_OK && independent)
+        status = factor_rows(x, &usable, hooks, err);
+    if (status == UZ_OK && usable)
         *out = x;
     else
         uz_projected_free(x);
@@ -223,6 +242,25 @@ void uz_projected_free(uz_projected *x)
     uz_factor_free(x->factor);
     uz_factor_workspace_free(x->ws);
     uz_free_all(x->row, x->b, x->y, x->room, x->e, x);
+}
+
+/* A row is missed where its gap is this, relative to the largest of the parts that gaps are differences of. */
+#define MISSED 1e-9
+
+bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *g)
+{
+    double scale = 0.0, most = 0.0, open = 0.0;
+    for (int64_t k = 0; x->softened && k < x->n; k++) {
+        const int64_t i = x->row[k];
+        scale = fmax(scale, fabs(h[i]) + fabs(h[i] - g[i]));
+        most = fmax(most, fabs(g[i]));
+        open = fmax(open, g[i]);
+    }
+    const bool any = r && open > MISSED * scale;
+    for (int64_t k = 0; any && k < x->n; k++)
+        if (g[x->row[k]] > 0.5 * open)
+            r[x->row[k]] = fmax(fabs(r[x->row[k]]), DBL_MIN);
+    return any || most <= MISSED * scale;
 }
 
 size_t uz_projected_bytes(const uz_projected *x)

@@ -14,8 +14,8 @@
 
 typedef struct uz_projected uz_projected;
 
-/* mg: the multigrid for K; dual, K, active (m): borrowed. *out NULL, UZ_OK: the rows depend on each other
- * to working precision. UZ_ERR_MEMORY. */
+/* mg: the multigrid for K; dual, K, active (m): borrowed. Rows that depend on each other to working precision are
+ * obeyed as far as they agree (_release). *out NULL, UZ_OK: a row has no entries. UZ_ERR_MEMORY. */
 uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const uz_dual *dual, const uz_csc *K,
                               const bool *active, const uz_hooks *hooks, uz_error *err);
 void uz_projected_free(uz_projected *x);
@@ -26,5 +26,8 @@ const uz_multigrid *uz_projected_multigrid(const uz_projected *x);
 uz_status uz_projected_close(uz_projected *x, double *u, const double *h, uz_error *err);
 /* r (m), 0 on other rows: the reactions with the least force - N'r in the norm of W; force (d) = K u - p. */
 uz_status uz_projected_react(uz_projected *x, double *r, const double *force, uz_error *err);
+/* Of rows that contradict others, by the gaps of an answer, those which it leaves open pull in r, as one of the others
+ * is in their way. h, g, r (m); r NULL: none may be left out. false: they contradict, and that is no way out. */
+bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *g);
 
 #endif

@@ -655,6 +655,60 @@ TEST(rows_between_two_bodies_have_an_active_set)
     }
 }
 
+/* The matrices of a pair with every second row once more, but for rounding, and closer or farther by so much. */
+static uz_problem repeated_pair(double closer)
+{
+    uz_problem pair = pair_problem(false, 0.004), problem = {.kind = UZ_PROBLEM_MATRICES};
+    uz_mesh_info info = {0};
+    uz_error err = {0};
+    uz_qp *qp = &problem.qp;
+    CHECK(uz_scene_to_qp(qp, &info, &pair.scene, &err) == UZ_OK);
+    const int64_t m = qp->N.rows, d = qp->N.cols, rows = m + (m + 1) / 2;
+    double *N = vector(rows * d), *h = vector(rows);
+    memcpy(h, qp->h, (size_t)m * sizeof *h);
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
+            N[qp->N.idx[k] * d + j] = qp->N.val[k];
+    for (int64_t i = 0; i < m; i += 2) {
+        for (int64_t j = 0; j < d; j++)
+            N[(m + i / 2) * d + j] = (1.0 + 1e-10 * (double)(j % 3)) * N[i * d + j];
+        h[m + i / 2] = h[i] + (i % 4 ? closer : -closer);
+    }
+    uz_csc_clear(&qp->N);
+    free(qp->h);
+    qp->N = csc_from_dense(N, rows, d, false);
+    qp->h = h;
+    free(N);
+    uz_mesh_info_clear(&info);
+    uz_problem_clear(&pair);
+    return problem;
+}
+
+/* Rows that are the same but for rounding, as of two sides that an obstacle touches beside their common edge, whether
+ * they agree or one of them is in the other's way: guesses, too, not tens of thousands of steps. */
+TEST(rows_that_depend_on_each_other_have_an_active_set)
+{
+    static const double closer[] = {0.0, 1e-9, 1e-5};
+    for (int k = 0; k < 3; k++) {
+        uz_problem problem = repeated_pair(closer[k]);
+        uz_settings exactly = settings_for(UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 1e-11),
+                    freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, k == 1 ? 1e-10 : 1e-6);
+        uz_result *exact = solve_problem(&problem, &exactly), *got = solve_problem(&problem, &freely);
+        if (exact && got) {
+            CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+            CHECK_INT(got->summary.method, UZ_METHOD_ACTIVE_SET);
+            CHECK_MSG(got->summary.iterations <= 16, "closer by %g: %lld guesses", closer[k],
+                      (long long)got->summary.iterations);
+            const double error = distance(&problem.qp.K, got->u, exact->u);
+            CHECK_MSG(error <= got->summary.certificate.absolute_error + exact->summary.certificate.absolute_error,
+                      "error %g, certified %g", error, got->summary.certificate.absolute_error);
+        }
+        uz_result_free(exact);
+        uz_result_free(got);
+        uz_problem_clear(&problem);
+    }
+}
+
 /* A solid of so many cells along a side that is clamped on its left and pulled down to a plane. */
 static uz_problem pressed_solid(const char *element, double length, int64_t cells)
 {
