@@ -142,15 +142,15 @@ static void check_threads(uz_body_model (*make)(uz_scene *scene, double poisson)
 
 TEST(threads_give_the_same_bits)
 {
-    if (!SANITIZED)
-        check_threads(make_cells, 0.3); /* two steps of the smoother, */
-    check_threads(make_cells, 0.49);    /* and four */
+    for (int k = 0; k < 2 && !SANITIZED; k++) /* two steps of the smoother, three, */
+        check_threads(make_cells, k == 0 ? 0.3 : 0.43);
+    check_threads(make_cells, 0.49); /* and four */
 }
 
 TEST(threads_give_the_same_bits_of_plane_bodies)
 {
-    if (!SANITIZED)
-        check_threads(make_plane, 0.3);
+    for (int k = 0; k < 2 && !SANITIZED; k++)
+        check_threads(make_plane, k == 0 ? 0.3 : 0.43);
     check_threads(make_plane, 0.49);
 }
 
