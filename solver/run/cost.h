@@ -57,9 +57,9 @@ int uz_cost_patience(const uz_cost_plan *plan, const uz_cost_size *size);
 /* Seconds of the body and so many loads on it (0: one). */
 double uz_cost_seconds(const uz_cost_estimate *form, int64_t cases);
 
-/* What is left of seconds of one thread on a brick, or NULL: none, where so many share what they can of it. The plan is
- * that of one: which form is taken does not depend on who else computes. */
-double uz_cost_shared(double seconds, uz_operator op, const uz_brick *brick, int threads);
+/* What is left of the seconds of one thread for a body and for loads on it, on a brick, or NULL: none, where so many
+ * share what they can of them. The plan is that of one: which form is taken does not depend on who else computes. */
+double uz_cost_shared(double setup_s, double loads_s, uz_operator op, const uz_brick *brick, int threads);
 
 /* The refusal where nothing fits: UZ_ERR_LIMIT with the predicted bytes. */
 uz_status uz_cost_refuse(const uz_cost_plan *plan, uz_operator asked, size_t memory_limit, uz_error *err);

@@ -54,7 +54,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, c
     out->fits = plan.chosen >= 0;
     out->op = e->op;
     out->bytes = e->bytes;
-    out->seconds = uz_cost_shared(uz_cost_seconds(e, cases), e->op, brick, uz_aside_threads());
+    out->seconds = uz_cost_shared(e->setup_s, uz_cost_seconds(e, cases) - e->setup_s, e->op, brick, uz_aside_threads());
     if (!uz_dual_form_of(out->op)->can.needs_factor)
         out->factor_nnz = 0;
     return UZ_OK;

@@ -60,8 +60,8 @@ static void report_cost(uz_run *run)
     for (int k = 0; k < plan->count; k++) {
         const uz_cost_estimate *form = &plan->form[k];
         const double load = run->asked->index > 0 ? form->next_s : form->case_s,
-                     alone = load + (run->asked->reused.op ? 0.0 : form->setup_s);
-        const double seconds = uz_cost_shared(alone, form->op, run->asked->setup->model.brick, uz_aside_threads());
+                     body = run->asked->reused.op ? 0.0 : form->setup_s;
+        const double seconds = uz_cost_shared(body, load, form->op, run->asked->setup->model.brick, uz_aside_threads());
         cost->considered[k] = (uz_cost_option){form->op, seconds, form->bytes, form->fits};
         if (k != plan->chosen)
             continue;
