@@ -78,6 +78,8 @@ uz_status uz_finite_chord(bool *found, double *norm, double *to, double *r, uz_f
         status = uz_dual_load_create(&load, dual, run->K, run->p, gap, err);
     }
     if (status == UZ_OK)
+        load->equations = true; /* they bear a correction, which may pull */
+    if (status == UZ_OK)
         status = uz_dual_load_aim(load, run->settings.relative_error, &stop, err);
     if (status == UZ_OK)
         status = uz_dual_load_solve_active(load, &end, s, g, pressing, err);

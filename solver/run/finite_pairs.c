@@ -159,6 +159,8 @@ static uz_status solve_held(bool *solved, correction *x, double *y, uz_error *er
         x->held[i] = x->pressing[i];
     uz_status status = uz_dual_load_create(&load, dual, x->run->K, x->dp, x->dh, err);
     if (status == UZ_OK)
+        load->equations = true; /* they bear a correction, which may pull */
+    if (status == UZ_OK)
         status = uz_dual_load_aim(load, SOLVED * x->left, &stop, err);
     if (status == UZ_OK)
         status = uz_dual_load_solve_active(load, &end, x->dr, x->g, x->held, err);
