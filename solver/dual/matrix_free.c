@@ -673,6 +673,8 @@ static uz_status solve_stepwise(free_load *x, double *r, double *g, bool *active
 
 /* Reactions that pull by less than this of the largest, times the tolerance, are what the solve has left. */
 #define WEAK 0.1
+/* Rows that penetrate by less than this of their scale touch: they depend on rows that are held, or nearly so. */
+#define TOUCHES 1e-14
 
 /* From x->u, which obeys the rows, to K u = p + N'r on them: u, r, g, and e = K u - p - N'r in cg->z. *right: no row is
  * seen to be wrong; *agree false: rows contradict each other. */
@@ -708,9 +710,11 @@ static uz_status solve_projected(free_load *x, uz_projected *part, bool *right, 
     for (int64_t i = 0; i < dual->m; i++)
         if (uz_reaction_pulls(x->r[i]) && fabs(x->r[i]) <= WEAK * tolerance * largest)
             x->r[i] = 0.0;
-    *agree = uz_projected_release(part, load->equations ? NULL : x->r, load->h, g); /* these bear anything */
+    *agree = uz_projected_release(part, load->equations ? NULL : x->r, load->h, x->u, g); /* these bear anything */
     for (int64_t i = 0; i < dual->m; i++) {
-        g[i] = active[i] ? 0.0 : g[i];
+        const bool overlaps = !active[i] && uz_gap_penetrates(g[i]);
+        if (active[i] || (overlaps && -g[i] <= TOUCHES * uz_projected_scale(part, i, load->h, x->u)))
+            g[i] = 0.0;
         *right = *right && !(active[i] ? uz_reaction_pulls(x->r[i]) : uz_gap_penetrates(g[i]));
     }
     uz_csc_gaxpy_t(e, &dual->N, -1.0, x->r);

@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/order.h"
+#include "linalg/blas.h"
 #include "linalg/linalg.h"
 
 #include <float.h>
@@ -19,9 +20,9 @@ struct uz_projected {
     int64_t n, *row; /* the active rows, ascending */
     uz_factor *factor;
     uz_factor_workspace *ws;
-    double *b, *y, *room; /* n each */
-    double *e;            /* d */
-    bool softened;
+    uz_csc G;                    /* where it was softened */
+    double *b, *y, *step, *room; /* n each */
+    double *e;                   /* d */
     size_t bytes;
 };
 
@@ -84,9 +85,11 @@ static uz_status make_matrix(uz_csc *G, const uz_projected *x, uz_error *err)
 }
 
 /* Where rows depend on each other, as those of two sides that an obstacle touches beside their common edge, this share
- * of its diagonal is added to G: what they agree on is closed but for the share, and reactions are of the least squares
- * among those that do the same. */
-#define SOFTENED 1e-10
+ * of its diagonal is added to G before it is factored, and solves are refined against G itself: what rows agree on is
+ * closed to rounding, and reactions are of the least squares among those that do the same. A share that were left would
+ * let conjugate gradients leave the rows. */
+#define SOFTENED    1e-8
+#define REFINEMENTS 2
 
 static void soften(uz_csc *G)
 {
@@ -105,10 +108,11 @@ static uz_status factor_rows(uz_projected *x, bool *usable, const uz_hooks *hook
         status = uz_analysis_create(&analysis, &G, NULL, 0, 0, UZ_ORDERING_AMD, hooks, err);
     if (status == UZ_OK) {
         status = uz_factor_create(&x->factor, &G, analysis, 0, hooks, &inner);
-        x->softened = status == UZ_ERR_NOT_SPD;
-        if (x->softened) {
+        if (status == UZ_ERR_NOT_SPD) {
+            status = uz_csc_copy(&x->G, &G, err);
             soften(&G);
-            status = uz_factor_create(&x->factor, &G, analysis, 0, hooks, &inner);
+            if (status == UZ_OK)
+                status = uz_factor_create(&x->factor, &G, analysis, 0, hooks, &inner);
         }
         *usable = status != UZ_ERR_NOT_SPD; /* else a row is 0, or no number */
         if (status == UZ_ERR_NOT_SPD)
@@ -117,16 +121,26 @@ static uz_status factor_rows(uz_projected *x, bool *usable, const uz_hooks *hook
             uz_fail(err, status, inner.where, "%s", inner.message);
     }
     if (x->factor)
-        x->bytes += uz_factor_describe(x->factor).bytes + uz_analysis_bytes(analysis) + uz_csc_bytes(&G);
+        x->bytes +=
+            uz_factor_describe(x->factor).bytes + uz_analysis_bytes(analysis) + uz_csc_bytes(&G) + uz_csc_bytes(&x->G);
     uz_analysis_free(analysis);
     uz_csc_clear(&G);
     return status;
 }
 
-/* y = G^-1 b */
+/* y = G^-1 b; b is lost. */
 static uz_status solve(uz_projected *x, uz_error *err)
 {
-    return x->n > 0 ? uz_factor_solve(x->factor, x->ws, x->y, x->b, x->room, err) : UZ_OK;
+    if (x->n == 0)
+        return UZ_OK;
+    uz_status status = uz_factor_solve(x->factor, x->ws, x->y, x->b, x->room, err);
+    memcpy(x->step, x->y, (size_t)x->n * sizeof *x->y);
+    for (int again = x->G.ptr ? REFINEMENTS : 0; status == UZ_OK && again > 0; again--) {
+        uz_csc_symv(x->b, &x->G, -1.0, x->step);
+        status = uz_factor_solve(x->factor, x->ws, x->step, x->b, x->room, err);
+        uz_axpy(x->n, 1.0, x->step, x->y);
+    }
+    return status;
 }
 
 static double row_dot(const uz_projected *x, int64_t k, const double *u)
@@ -216,16 +230,17 @@ uz_status uz_projected_create(uz_projected **out, const uz_multigrid *mg, const 
     x->row = uz_alloc(x->n, sizeof *x->row);
     x->b = uz_alloc(x->n, sizeof *x->b);
     x->y = uz_alloc_zero(x->n, sizeof *x->y);
+    x->step = uz_alloc(x->n, sizeof *x->step);
     x->room = uz_alloc(x->n, sizeof *x->room);
     x->e = uz_alloc(mg->n, sizeof *x->e);
     x->ws = uz_factor_workspace_new();
-    uz_status status = x->row && x->b && x->y && x->room && x->e && x->ws
+    uz_status status = x->row && x->b && x->y && x->step && x->room && x->e && x->ws
                            ? UZ_OK
                            : uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)x->n);
     for (int64_t i = 0, k = 0; status == UZ_OK && i < dual->m; i++)
         if (active[i])
             x->row[k++] = i;
-    x->bytes = sizeof *x + 32 * (size_t)x->n + 8 * (size_t)mg->n;
+    x->bytes = sizeof *x + 40 * (size_t)x->n + 8 * (size_t)mg->n;
     if (status == UZ_OK && x->n > 0)
         status = factor_rows(x, &usable, hooks, err);
     if (status == UZ_OK && usable)
@@ -241,18 +256,28 @@ void uz_projected_free(uz_projected *x)
         return;
     uz_factor_free(x->factor);
     uz_factor_workspace_free(x->ws);
-    uz_free_all(x->row, x->b, x->y, x->room, x->e, x);
+    uz_csc_clear(&x->G);
+    uz_free_all(x->row, x->b, x->y, x->step, x->room, x->e, x);
 }
 
-/* A row is missed where its gap is this, relative to the largest of the parts that gaps are differences of. */
-#define MISSED 1e-9
+double uz_projected_scale(const uz_projected *x, int64_t i, const double *h, const double *u)
+{
+    const uz_csc *Nt = &x->dual->Nt;
+    double sum = fabs(h[i]);
+    for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++)
+        sum += fabs(Nt->val[q] * u[Nt->idx[q]]);
+    return sum;
+}
 
-bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *g)
+/* A row is missed where its gap is this, relative to the largest scale of one. */
+#define MISSED 1e-12
+
+bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *u, const double *g)
 {
     double scale = 0.0, most = 0.0, open = 0.0;
-    for (int64_t k = 0; x->softened && k < x->n; k++) {
+    for (int64_t k = 0; x->G.ptr && k < x->n; k++) {
         const int64_t i = x->row[k];
-        scale = fmax(scale, fabs(h[i]) + fabs(h[i] - g[i]));
+        scale = fmax(scale, uz_projected_scale(x, i, h, u));
         most = fmax(most, fabs(g[i]));
         open = fmax(open, g[i]);
     }

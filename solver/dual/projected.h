@@ -26,8 +26,11 @@ const uz_multigrid *uz_projected_multigrid(const uz_projected *x);
 uz_status uz_projected_close(uz_projected *x, double *u, const double *h, uz_error *err);
 /* r (m), 0 on other rows: the reactions with the least force - N'r in the norm of W; force (d) = K u - p. */
 uz_status uz_projected_react(uz_projected *x, double *r, const double *force, uz_error *err);
-/* Of rows that contradict others, by the gaps of an answer, those which it leaves open pull in r, as one of the others
- * is in their way. h, g, r (m); r NULL: none may be left out. false: they contradict, and that is no way out. */
-bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *g);
+/* Of rows that contradict others, by the gaps g of an answer u, those which it leaves open pull in r, as one of the
+ * others is in their way. h, g, r (m), u (d); r NULL: none may be left out. false: they contradict, and that is no way
+ * out. */
+bool uz_projected_release(const uz_projected *x, double *r, const double *h, const double *u, const double *g);
+/* |h_i| + sum of |N_ij u_j|, which a gap h_i - N_i u is rounded to some parts in 1e16 of. */
+double uz_projected_scale(const uz_projected *x, int64_t i, const double *h, const double *u);
 
 #endif

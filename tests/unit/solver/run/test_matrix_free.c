@@ -712,6 +712,61 @@ TEST(rows_that_depend_on_each_other_have_an_active_set)
     }
 }
 
+/* Rows on a random K of which many depend on others. */
+typedef enum { COMBINED, WALLS, THROUGH_ZERO, DEPENDENCES } dependence;
+
+static uz_problem dependent_rows(dependence kind, uint64_t seed)
+{
+    qp_random rng = {7919 * seed + 104729 * (uint64_t)kind + 5};
+    const int64_t d = 8 + (int64_t)(seed % 25), m = 2 * (3 + (int64_t)(seed % 7));
+    const qp_kind combined = {
+        .d = d, .m = m, .condition = pow(10.0, (double)(seed % 5)), .dependent = true, .badly_scaled = seed % 2 > 0};
+    if (kind == COMBINED)
+        return problem_of(random_qp(&rng, &combined));
+    uz_qp qp = {.p = vector(d), .h = vector(m)};
+    double *K = random_spd(&rng, d, pow(10.0, (double)(seed % 4)), 10), *N = vector(m * d), *within = vector(d);
+    for (int64_t j = 0; j < d; j++) {
+        within[j] = random_signed(&rng);
+        qp.p[j] = (kind == THROUGH_ZERO ? 1e-12 : 1.0) * 10 * random_signed(&rng);
+    }
+    for (int64_t i = 0; i < m; i++) {
+        double *row = N + i * d;
+        for (int64_t j = 0; j < d; j++)
+            row[j] = random_unit(&rng) < 0.4 ? random_signed(&rng) : 0;
+        row[random_int(&rng, 0, d)] = 1;
+        for (int64_t j = 0; i % 2 > 0 && j < d; j++)
+            row[j] = (kind == WALLS ? -1.0 : 0.3) * row[j - d];
+        for (int64_t j = 0; kind == WALLS && j < d; j++) /* where both walls of a pair leave no room */
+            qp.h[i] += row[j] * within[j];
+    }
+    qp.K = csc_from_dense(K, d, d, true);
+    qp.N = csc_from_dense(N, m, d, false);
+    free(K);
+    free(N);
+    free(within);
+    return problem_of(qp);
+}
+
+/* Guesses come to their end, as far as rounding tells rows from others that they depend on. */
+TEST(guesses_of_dependent_rows_end)
+{
+    static const double asked[] = {1e-6, 1e-9, 1e-12};
+    for (dependence kind = COMBINED; kind < DEPENDENCES; kind++)
+        for (uint64_t seed = 0; seed < 60; seed++) {
+            uz_problem problem = dependent_rows(kind, seed);
+            uz_settings freely =
+                settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, asked[seed % (sizeof asked / sizeof *asked)]);
+            uz_result *got = solve_problem(&problem, &freely);
+            if (got) {
+                CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+                CHECK_MSG(got->summary.iterations < 40, "kind %d, seed %d: %lld iterations", (int)kind, (int)seed,
+                          (long long)got->summary.iterations);
+            }
+            uz_result_free(got);
+            uz_problem_clear(&problem);
+        }
+}
+
 /* A solid of so many cells along a side that is clamped on its left and pulled down to a plane. */
 static uz_problem pressed_solid(const char *element, double length, int64_t cells)
 {
