@@ -86,16 +86,18 @@ static int64_t node_count(const int64_t cells[3])
     return (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1);
 }
 
-/* The cells of the next grid; false: there is none. */
-static bool coarsen(int64_t next[3], const uz_brick_level *level)
+/* The cells of the next grid and how large they are; false: there is none. */
+static bool coarsen(int64_t next[3], double size[3], int axes, const int64_t cells[3], const double cell[3])
 {
     double least = INFINITY;
     for (int c = 0; c < 3; c++)
-        if (level->cells[c] > 1)
-            least = fmin(least, level->cell[c]);
-    for (int c = 0; c < 3; c++)
-        next[c] = level->cells[c] > 1 && level->cell[c] < SHORT * least ? (level->cells[c] + 1) / 2 : level->cells[c];
-    return level->axes * node_count(level->cells) > FEW_DOFS && node_count(next) < node_count(level->cells);
+        if (cells[c] > 1)
+            least = fmin(least, cell[c]);
+    for (int c = 0; c < 3; c++) {
+        next[c] = cells[c] > 1 && cell[c] < SHORT * least ? (cells[c] + 1) / 2 : cells[c];
+        size[c] = next[c] > 0 ? cell[c] * ((double)cells[c] / (double)next[c]) : 0.0;
+    }
+    return axes * node_count(cells) > FEW_DOFS && node_count(next) < node_count(cells);
 }
 
 static bool make_levels(uz_brick_grids *mg, bool *sound)
@@ -108,8 +110,9 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
     for (;; l++) {
         uz_brick_level *level = &mg->level[l];
         int64_t next[3];
+        double size[3];
         level->axes = brick->axes;
-        const bool last = !coarsen(next, level) || l + 1 == UZ_BRICK_LEVELS_MOST;
+        const bool last = !coarsen(next, size, level->axes, level->cells, level->cell) || l + 1 == UZ_BRICK_LEVELS_MOST;
         const bool coarser[3] = {next[0] < level->cells[0], next[1] < level->cells[1], next[2] < level->cells[2]};
         *sound = *sound && init_level(level, mg->ke, brick, mg->unit, coarser);
         mg->base.levels = l + 1;
@@ -118,7 +121,7 @@ static bool make_levels(uz_brick_grids *mg, bool *sound)
         for (int c = 0; c < 3; c++) {
             mg->level[l + 1].cells[c] = next[c];
             mg->level[l + 1].halvings[c] = level->halvings[c] + (next[c] < level->cells[c] ? 1 : 0);
-            mg->level[l + 1].cell[c] = next[c] > 0 ? level->cell[c] * ((double)level->cells[c] / (double)next[c]) : 0.0;
+            mg->level[l + 1].cell[c] = size[c];
             if (!uz_brick_axis_init(&level->to[c], level->cells[c], next[c]))
                 return false;
         }
@@ -590,10 +593,20 @@ static const uz_multigrid_kind KIND = {.apply = apply,
 double uz_brick_predict_bytes(const uz_brick *brick)
 {
     const bool plane = brick->axes == 2;
-    const double stride = (double)uz_brick_stride(brick->cells[0]) + (plane ? UZ_BRICK_PAD : 0),
-                 line = brick->axes * stride * (double)(brick->cells[1] + 1),
-                 padded = line * (double)(brick->cells[2] + 1);
-    return 4.0 * 5.0 * (plane ? 1.5 : 1.25) * padded + 16.0 * FEW_DOFS * FEW_DOFS + (plane ? 400.0 : 192.0) * line;
+    int64_t cells[3] = {brick->cells[0], brick->cells[1], brick->cells[2]};
+    double cell[3] = {brick->cell[0], brick->cell[1], brick->cell[2]}, bytes = 16.0 * FEW_DOFS * FEW_DOFS;
+    bool more = true;
+    for (int l = 0; more && l < UZ_BRICK_LEVELS_MOST; l++) {
+        int64_t next[3];
+        double size[3];
+        const double stride = (double)uz_brick_stride(cells[0]) + (plane ? UZ_BRICK_PAD : 0),
+                     line = brick->axes * stride * (double)(cells[1] + 1);
+        bytes += 4.0 * 5.0 * line * (double)(cells[2] + 1) + (l > 0 ? 0.0 : plane ? 400.0 : 192.0) * line;
+        more = coarsen(next, size, brick->axes, cells, cell);
+        memcpy(cells, next, sizeof cells);
+        memcpy(cell, size, sizeof cell);
+    }
+    return bytes;
 }
 
 uz_status uz_brick_multigrid(uz_multigrid **out, const uz_brick *brick, size_t memory_limit, uz_error *err)
