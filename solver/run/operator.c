@@ -116,7 +116,8 @@ typedef struct {
     const uz_settings *settings;
     const uz_hooks *hooks;
     uz_operator direct; /* the form that a factor is analysed for */
-    uz_operator asked;  /* the settings', until conjugate gradients have failed where a factor fits */
+    uz_operator asked;  /* the settings', until conjugate gradients have failed where a factor may fit */
+    bool dear, fails;   /* they have: they would take many times as long; there is no multigrid for them */
 } making;
 
 static uz_status make_dual(making *m, uz_operator op, uz_error *err)
@@ -147,6 +148,8 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
 
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
 #define LAMBDA_LEAST 1e-3
+#define DEAR         10.0
+
 /* A multigrid that a group of processes holds. */
 static uz_status spread(making *m, uz_error *err)
 {
@@ -234,6 +237,8 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
                                    : status == UZ_ERR_NOT_SPD || (status == UZ_ERR_LIMIT && !setup->model.brick));
     if (!*regretted)
         return status;
+    m->dear = true;
+    m->fails = status != UZ_OK;
     uz_dual_free(setup->dual);
     uz_amg_free(setup->amg);
     setup->dual = NULL;
@@ -242,7 +247,37 @@ static uz_status precondition(making *m, bool *regretted, uz_error *err)
     return setup->model.brick ? uz_body_model_assemble(&setup->model, err) : UZ_OK;
 }
 
-enum { TRIES = 4 };
+/* Conjugate gradients have been regretted, and the form that was to take their place does not fit: the cheapest of the
+ * others that do, with a factor or, where they are only dear, without one. */
+static bool ask_for_another(making *m)
+{
+    const uz_cost_plan *plan = &m->setup->plan;
+    const uz_operator refused = m->asked;
+    double least = INFINITY;
+    for (int k = 0; m->dear && k < plan->count; k++) {
+        const uz_cost_estimate *form = &plan->form[k];
+        const bool by_factor = uz_dual_form_of(form->op)->can.needs_factor;
+        const double loads_s = uz_cost_seconds(form, m->size.cases) - form->setup_s,
+                     seconds = form->setup_s + (by_factor ? 1.0 : DEAR) * loads_s;
+        if (!form->fits || form->op == refused || (!by_factor && m->fails) || !(seconds < least))
+            continue;
+        least = seconds;
+        m->asked = form->op;
+    }
+    return isfinite(least);
+}
+
+static void decide_without_factor(making *m)
+{
+    uz_cost_plan *plan = &m->setup->plan;
+    uz_cost_decide(plan, &m->size, NULL, m->direct, m->settings->op, m->settings->memory_limit);
+    for (int k = 0; m->dear && k < plan->count; k++) {
+        plan->form[k].case_s *= DEAR;
+        plan->form[k].next_s *= DEAR;
+    }
+}
+
+enum { TRIES = 6 };
 
 uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, const uz_settings *settings,
                                   const uz_hooks *hooks, uz_error *err)
@@ -297,7 +332,7 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, uz_
     bool done = false;
     for (int k = 0; status == UZ_OK && !done && k < TRIES; k++) {
         if (no_factor) {
-            uz_cost_decide(plan, &m.size, NULL, m.direct, settings->op, limit);
+            decide_without_factor(&m);
         } else if (k > 0 || !surely_free) { /* else nobody needs the order of a factor */
             plan->chosen = -1;
             int64_t n_dofs = uz_dual_form_of(m.direct)->can.contact_last ? n_b : 0;
@@ -314,9 +349,14 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, uz_
             if (done && status == UZ_OK)
                 status = make_dual(&m, m.direct, err);
         }
-        if (status != UZ_OK || done || plan->chosen < 0)
+        if (status != UZ_OK || done)
             break;
-        if (!uz_dual_form_of(plan->form[plan->chosen].op)->can.needs_factor) {
+        if (plan->chosen < 0) {
+            if (!ask_for_another(&m))
+                break;
+            no_factor = !uz_dual_form_of(m.asked)->can.needs_factor;
+            m.direct = no_factor ? m.direct : m.asked;
+        } else if (!uz_dual_form_of(plan->form[plan->chosen].op)->can.needs_factor) {
             bool regretted;
             status = precondition(&m, &regretted, err);
             done = !regretted;

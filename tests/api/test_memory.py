@@ -6,8 +6,10 @@ refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FIL
 import contextlib
 import copy
 import http.client
+import itertools
 import os
 import pathlib
+import random
 import re
 import threading
 import time
@@ -201,6 +203,42 @@ def cube(n):
                         "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": 0}],
                         "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [0.5, 0.5, 1.98], "radius": 2}}}]},
             "solver": {"accuracy": {"relative_error": 1e-6}}}
+
+
+def crumbly_cube(n):
+    """Tetrahedra, six to a cell, every other one of which is nearly nothing, by chance."""
+    def node(*at):
+        return at[0] + (n + 1) * (at[1] + (n + 1) * at[2])
+    nodes = [[x / n, y / n, z / n - 1] for z in range(n + 1) for y in range(n + 1) for x in range(n + 1)]
+    elements, sides = [], {"back": [], "front": []}
+    for z, y, x in itertools.product(range(n), repeat=3):
+        for first, second, third in itertools.permutations(range(3)):
+            corners = [[x, y, z]]
+            for axis in first, second, third:
+                corners.append([c + (a == axis) for a, c in enumerate(corners[-1])])
+            if (first, second, third) not in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # odd ones have the other hand
+                corners[1], corners[2] = corners[2], corners[1]
+            elements.append([node(*c) for c in corners])
+            for name, height in ("back", 0), ("front", n):
+                side = [node(*c) for c in corners if c[2] == height]
+                if len(side) == 3:
+                    sides[name].append(side)
+    chance, body = random.Random(1), cube(n)
+    parts = [chance.random() < 0.5 for _ in elements]
+    body["problem"]["mesh"] = {"nodes": nodes, "elements": {"tet4": elements}, "groups": {
+        **{name: {"faces": faces} for name, faces in sides.items()},
+        **{name: {"elements": [e for e, part in enumerate(parts) if part == is_stiff]} for name, is_stiff in
+           (("stiff", True), ("soft", False))}}}
+    body["problem"]["materials"] = [{"on": "stiff", "young": 1000, "poisson": 0.3}, {"on": "soft", "young": 1e-5, "poisson": 0.3}]
+    return body
+
+
+@options("--memory", "620M")
+def test_what_was_regretted_is_taken_where_nothing_else_fits(s):
+    """A factor is told to fit by its least, and does not by what it is: conjugate gradients, however many they are."""
+    job = s.solve(crumbly_cube(28))
+    check(job["status"] == "successful", job)
+    check(job["summary"]["outcome"] == "converged" and job["summary"]["operator"] == "matrix_free", job["summary"])
 
 
 FORMS = "condensed", "factored", "matrix_free"
