@@ -164,6 +164,7 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
         const uz_analysis *analysis = kept_analysis ? uz_item_object(kept_analysis) : own_analysis;
         if (status == UZ_OK) {
             uz_factor_info predicted = uz_analysis_describe(analysis);
+            predicted.order_s = out->analysis_reused ? 0.0 : predicted.order_s;
             status = accept(ctx, &predicted, err);
             if (status == UZ_OK && cache)
                 uz_table_expect(cache, item, predicted.bytes);
@@ -179,7 +180,8 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
     } else {
         factor = ((kept_factor *)uz_item_object(item))->factor;
         uz_factor_info there = uz_factor_describe(factor);
-        status = accept(ctx, &there, err);
+        there.condensing = uz_factor_condensing(factor, dofs, n_dofs, rows);
+        status = there.condensing < 0.0 ? uz_no_memory(err, "what a contact reaches") : accept(ctx, &there, err);
         out->analysis_reused = out->factor_reused = status == UZ_OK;
         if (status != UZ_OK)
             uz_table_release(cache, item);

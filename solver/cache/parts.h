@@ -20,7 +20,9 @@ typedef struct {
     uz_item *item;
 } uz_shared_factor;
 
-/* Asked before a factor is made, or one that is there is taken: what it returns, if not UZ_OK, ends the call. */
+/* Asked before a factor is made, or one that is there is taken: what it returns, if not UZ_OK, ends the call. An order
+ * that is there takes no seconds in `predicted`, whose factor_s is 0 where the factor is to be made, and `condensing`
+ * is told where it is not. */
 typedef uz_status (*uz_factor_accept)(void *ctx, const uz_factor_info *predicted, uz_error *err);
 
 /* Finds a factor of K, one that ends with the contact's dofs (ascending) if it can, or makes one that does or that

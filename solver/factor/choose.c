@@ -25,7 +25,6 @@ typedef struct {
 static uz_status consider(chooser *c, uz_ordering ordering, bool contact_last, uz_error *err)
 {
     uz_analysis *analysis = c->analysis;
-    const double m = (double)c->rows, n_b = (double)analysis->n_last;
     double flops = 0.0;
     const int64_t n_last = contact_last ? c->n_last : 0;
     uz_status status = UZ_OK;
@@ -49,13 +48,10 @@ static uz_status consider(chooser *c, uz_ordering ordering, bool contact_last, u
         const double count = (double)((const SuiteSparse_long *)L->ColCount)[j];
         flops += count * count;
     }
-    if (L && c->rows > 0 && analysis->n_last > 0) {
-        const double condensing =
-            contact_last ? m * n_b * (m + n_b) : uz_reach_flops(L, analysis->last, analysis->n_last, c->rows);
-        flops += condensing;
-        if (condensing < 0.0) /* no memory */
-            cholmod_l_free_factor(&L, c->common);
-    }
+    const double condensing = L ? uz_condensing_flops(L, contact_last, analysis->last, analysis->n_last, c->rows) : 0.0;
+    flops += condensing;
+    if (condensing < 0.0) /* no memory */
+        cholmod_l_free_factor(&L, c->common);
     if (!L)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs (CHOLMOD status %d)",
                        (long long)analysis->n, c->common->status);

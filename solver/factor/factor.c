@@ -215,3 +215,9 @@ bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n
         found += factor->info.last[k] == dofs[found];
     return found == n;
 }
+
+double uz_factor_condensing(const uz_factor *factor, const int64_t *dofs, int64_t n_dofs, int64_t rows)
+{
+    const bool last = uz_factor_ends_with(factor, dofs, n_dofs);
+    return uz_condensing_flops(&factor->L, last, dofs, n_dofs, last || rows > 0 ? rows : n_dofs);
+}

@@ -110,9 +110,9 @@ uz_status uz_paths_hold(bool *positive, uz_paths *x, const bool *fixed, const uz
 /* As uz_principal_solve. */
 uz_status uz_paths_solve(double *v, uz_paths *x, uz_error *err);
 
-/* Additions and multiplications of uz_reach_gram with `rows` rows on n_dofs dofs, by a symbolic factor; below 0: no
- * memory. */
-double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);
+/* Additions and multiplications of condensing `rows` rows on n_dofs dofs, by a symbolic factor in which these come last
+ * or anywhere (uz_reach_gram); rows 0: each of the last ones has its own, which is there. Below 0: no memory. */
+double uz_condensing_flops(const cholmod_factor *L, bool last, const int64_t *dofs, int64_t n_dofs, int64_t rows);
 
 /* Fills info.rcond. UZ_ERR_NOT_SPD where K is singular to working precision. */
 uz_status uz_find_least_pivot(uz_factor *factor, const uz_csc *K, uz_error *err);

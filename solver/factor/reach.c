@@ -41,8 +41,12 @@ static int64_t parent_of(const cholmod_factor *L, int64_t s, const int64_t *owne
     return node.rows > node.columns ? owner[node.row[node.columns]] : -1;
 }
 
-double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows)
+double uz_condensing_flops(const cholmod_factor *L, bool last, const int64_t *dofs, int64_t n_dofs, int64_t rows)
 {
+    if (rows == 0 || n_dofs == 0)
+        return 0.0;
+    if (last)
+        return (double)rows * (double)n_dofs * (double)(rows + n_dofs);
     const SuiteSparse_long *perm = L->Perm;
     bool *touched = uz_alloc_zero((int64_t)L->n, sizeof *touched);
     int64_t *owner = uz_alloc((int64_t)L->n, sizeof *owner), *below = uz_alloc_zero((int64_t)L->nsuper, sizeof *below);

@@ -162,6 +162,12 @@ static double matrix_bytes(const uz_cost_size *s)
     return 12.0 * (double)s->k_entries + 8.0 * (double)s->d + 36.0 * (double)s->n_entries;
 }
 
+/* Has the factor been made, and does it take no more time? */
+static bool is_there(const uz_factor_info *factor)
+{
+    return factor->factor_s > 0.0;
+}
+
 /* predicted: the factor (nnz, flops, bytes, order_s) analysed for the form `of`, whose own differs from it by what
  * ordering the contact last costs; NULL for a form that needs none. */
 static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_size *size,
@@ -178,10 +184,11 @@ static uz_cost_estimate estimate(const uz_dual_abilities *can, const uz_cost_siz
         L.flops *= last == was_last ? 1.0 : last ? LAST_FLOPS : 1.0 / LAST_FLOPS;
         L.nnz = (int64_t)((double)L.nnz * entries);
         L.bytes = (size_t)((double)L.bytes * entries);
-        out.flops = L.flops;
+        out.flops = !is_there(predicted) ? L.flops : last ? L.condensing : 0.0;
         out.bytes += FACTOR_PEAK * (double)L.bytes;
-        out.setup_s =
-            UZ_COST_FACTOR_FLOPS * L.flops * rates->flop_s + UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
+        out.setup_s = UZ_COST_FACTOR_FLOPS * out.flops * rates->flop_s;
+        if (!is_there(predicted))
+            out.setup_s += UZ_COST_FACTOR_PASSES * (double)L.nnz * rates->entry_s;
     }
     uz_dual_form_of(out.op)->add_cost(&out, size, predicted ? &L : NULL, rates);
     out.next_s = out.next_s > 0.0 ? out.next_s : out.case_s;
@@ -341,6 +348,7 @@ static void decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor
                    uz_operator direct, uz_operator asked, size_t memory_limit)
 {
     const uz_cost_rates rates = rates_of(size);
+    const double order_s = factor && !is_there(factor) ? factor->order_s : 0.0;
     plan->count = 0;
     if (factor)
         plan->form[plan->count++] = estimate(&uz_dual_form_of(direct)->can, size, factor, direct, &rates);
@@ -355,8 +363,8 @@ static void decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor
     const double cheaper = size->cases > 1 ? 1.0 : MUCH_CHEAPER;
     for (int k = 0; k < plan->count; k++) {
         uz_cost_estimate *form = &plan->form[k];
-        if (factor && !ordered && uz_dual_form_of(form->op)->can.needs_factor)
-            form->setup_s += factor->order_s;
+        if (!ordered && uz_dual_form_of(form->op)->can.needs_factor)
+            form->setup_s += order_s;
         form->fits = memory_limit == 0 || form->bytes <= (double)memory_limit;
         bool allowed = asked == UZ_OPERATOR_AUTO || form->op == asked;
         if (!allowed || !form->fits)
@@ -366,8 +374,8 @@ static void decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor
                                  cheaper * uz_cost_seconds(form, size->cases) < before))
             plan->chosen = k;
     }
-    for (int k = 0; k < plan->count && factor && ordered; k++)
-        plan->form[k].setup_s += factor->order_s;
+    for (int k = 0; k < plan->count && ordered; k++)
+        plan->form[k].setup_s += order_s;
 }
 
 void uz_cost_decide(uz_cost_plan *plan, const uz_cost_size *size, const uz_factor_info *factor, uz_operator direct,

@@ -286,16 +286,21 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
     making m = {.setup = setup, .K = uz_setup_K(setup, problem), .N = uz_setup_N(setup, problem), .hooks = hooks};
     int64_t *dofs = NULL, n_b = 0;
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
-    free(dofs);
     setup->factor = base->factor;
     setup->amg = base->amg;
     setup->plan = base->plan;
+    uz_factor_info there = setup->factor ? uz_factor_describe(setup->factor) : (uz_factor_info){0};
+    if (status == UZ_OK && setup->factor)
+        there.condensing =
+            uz_factor_condensing(setup->factor, dofs, n_b, uz_cost_is_one_to_one(m.N, n_b) ? 0 : m.N->rows);
+    free(dofs);
+    if (there.condensing < 0.0)
+        status = uz_no_memory(err, "what a contact reaches");
     if (status != UZ_OK)
         return status;
-    if (!base->factor)
+    if (!setup->factor)
         return make_dual(&m, base->dual->can->op, err);
     m.size = uz_cost_size_of(m.K, m.N, setup->is_scene ? &setup->model : NULL, &problem->scene, n_b, 0, settings);
-    const uz_factor_info there = uz_factor_describe(base->factor);
     const uz_operator direct = uz_dual_choose(m.N, n_b, settings->op);
     uz_cost_decide(&setup->plan, &m.size, &there, direct, settings->op, settings->memory_limit);
     const int chosen = setup->plan.chosen;

@@ -48,7 +48,10 @@ def test_a_body_solved_without_contact_before(s):
     plain = {**service.SCENE, "problem": {**service.SCENE["problem"]}}
     free = {**plain, "problem": {key: value for key, value in plain["problem"].items() if key != "contacts"}}
     s.solve(free)
-    check(s.solve(plain)["summary"]["factor"]["reused"]["factor"])
+    told = s.solve(plain)["summary"]
+    check(told["factor"]["reused"]["factor"])
+    # it is not predicted to be made again
+    check(told["cost"]["predicted"]["flops"] < told["factor"]["flops"], told["cost"], told["factor"])
 
 
 if __name__ == "__main__":

@@ -130,6 +130,10 @@ TEST(reach_does_what_whole_substitutions_do)
         CHECK(uz_reach_create(&reach, factor, dofs, count, &err) == UZ_OK);
         check_gram(reach, factor, ws, &N);
         check_substitutions(reach, factor, ws, &N, dofs, count);
+        const double flops = uz_factor_condensing(factor, dofs, count, 0);
+        CHECK(uz_factor_ends_with(factor, dofs, count) ? flops == 0 : flops > 0);
+        if (seed % 2 && count > 0)
+            CHECK_REL(uz_factor_condensing(factor, dofs, count, 7), 7.0 * (double)(count * (7 + count)), 1e-15);
         uz_reach_free(reach);
         uz_factor_free(factor);
         uz_factor_workspace_free(ws);

@@ -351,6 +351,33 @@ TEST(an_order_that_is_there_makes_no_form_dearer)
     }
 }
 
+/* It is chosen, where it would not be made, and of it only the contact that it was not made for is paid. */
+TEST(a_factor_that_is_there_is_not_paid_again)
+{
+    const uz_cost_size size = {.d = 100000,
+                               .m = 100,
+                               .n_b = 100,
+                               .k_entries = 4100000,
+                               .n_entries = 100,
+                               .modes = 6,
+                               .active_set = true,
+                               .bounds = true,
+                               .cases = 1};
+    uz_factor_info factor = {.nnz = 400000000, .flops = 1e12, .bytes = 32000000, .order_s = 1000.0};
+    uz_cost_plan made, there, condensed;
+    uz_cost_decide(&made, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK_INT(made.form[made.chosen].op, UZ_OPERATOR_MATRIX_FREE);
+    factor.factor_s = 1.0;
+    uz_cost_decide(&there, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK_INT(there.form[there.chosen].op, UZ_OPERATOR_CONDENSED);
+    CHECK(there.form[0].setup_s < 1e-3 * made.form[0].setup_s);
+    CHECK_REL(there.form[0].case_s, made.form[0].case_s, 1e-12);
+    factor.condensing = 1e9;
+    uz_cost_decide(&condensed, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
+    CHECK_REL(condensed.form[0].flops, there.form[0].flops + 1e9, 1e-12);
+    CHECK(condensed.form[0].setup_s > there.form[0].setup_s);
+}
+
 /* What is asked for by name has room for aggregates of another kind where the steps are many; a choice does without. */
 TEST(a_form_without_another_takes_more_where_it_is_hard)
 {
