@@ -812,6 +812,17 @@ static double off_support(const uz_finite_answer *of, int64_t a, int c)
     return dof < 0 ? uz_along_dof(model, a, c, of->u + dim * a) - of->prescribed[-1 - dof] : 0;
 }
 
+/* Gaps are known to the last digits of places, whose last one is so many times larger than it is of a body that stands
+ * where coordinates begin. */
+static double find_distance(const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    double farthest = 0;
+    for (int64_t i = 0; i < mesh->dim * mesh->n_nodes && model->m > 0; i++)
+        farthest = fmax(farthest, fabs(mesh->xyz[i]));
+    return fmax(1, farthest / mesh->extent);
+}
+
 /* The factor of H, and with it the residual. */
 static uz_status judge(uz_finite_certificate *out, work *w, uz_error *err)
 {
@@ -847,7 +858,8 @@ static uz_status judge(uz_finite_certificate *out, work *w, uz_error *err)
         work_left += w->of->r[i] < -w->pressed ? 0 : fabs(w->of->r[i] * w->of->g[i]);
     const double tiny = TINY * TINY * (double)w->unit, energy = out->energy > tiny ? out->energy : (double)w->small;
     const double left = sqrt(square + 2 * work_left), norm = sqrt(2 * energy);
-    const double rounding = ROUNDING * sqrt((double)w->unit);
+    out->distance = find_distance(model);
+    const double rounding = ROUNDING * out->distance * sqrt((double)w->unit);
     out->rounding = norm > 0 ? rounding / norm : (double)INFINITY;
     if (out->definite) /* what is not strained is exact to rounding */
         out->residual = left <= rounding && norm <= rounding ? 0 : norm > 0 ? left / norm : (double)INFINITY;

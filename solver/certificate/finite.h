@@ -29,7 +29,8 @@ typedef struct {
      * gaps of these rows; r'g of the others. To first order a bound on the distance from the equilibrium, in the norm
      * of H. INFINITY where H is not positive definite */
     double residual;
-    double rounding; /* less than this of `residual` may be rounding of F, as where strains are tiny */
+    double rounding; /* less than this of `residual` may be rounding of F, as where strains are tiny, or of gaps */
+    double distance; /* the largest coordinate over the body's extent where there are rows, else, and at least, 1 */
     bool unstrained; /* no element has more strain than what solves and rounding leave of its own F and way */
     /* A Cholesky factor of H exists: the energy grows along every small motion that leaves the pressed rows closed, so
      * that the equilibrium is a strict local minimum of what the mesh can do */

@@ -18,6 +18,8 @@
 /* An obstacle that stands deeper in a side between rows than this part of its length, or presses it from farther away:
  * rows leave 0.01 at most. */
 #define CUTS_IN 0.03
+/* A body that stands so much farther from where coordinates begin than it is large gains digits there. */
+#define FAR 3
 /* And one that no side of the contact comes so near to. */
 #define TOUCHES 1e-6
 /* Forces that are less than this part of those by which the strain energy comes from the largest displacement are what
@@ -52,6 +54,14 @@ static void explain(uz_summary *s, const uz_finite_run *run, uz_part why, double
                  "the obstacle, or another body, stands %.3g of a side's length deep in it, between rows: use a finer "
                  "mesh along the contact",
                  -c->least_part);
+        return;
+    }
+    if (s->outcome == UZ_PRECISION_LIMIT && c->distance > FAR) {
+        snprintf(
+            text, size,
+            "coordinates are up to %.3g times as large as the body, and the rounding of places and gaps leaves %.3g "
+            "of the strains, asked for %.3g: move it to where they begin",
+            c->distance, s->finite.residual, s->requested_error);
         return;
     }
     if (s->outcome == UZ_PRECISION_LIMIT) {

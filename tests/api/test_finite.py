@@ -403,6 +403,25 @@ def test_a_block_slides_over_another(s):
         expect(s.get(f"/v1/jobs/{there[0]}/{of}"), 200)
 
 
+def test_bodies_that_stand_far_away(s):
+    """Gaps have their last digits from coordinates: their rounding is no instability, and it is told what helps."""
+    def energy(far, down):
+        asked = stacked(0)
+        mesh = asked["problem"]["mesh"]
+        mesh["nodes"] = [[x + far, y - far] for x, y in mesh["nodes"]]
+        asked["problem"]["supports"][1]["uy"] = -down
+        summary = s.solve({**asked, "solver": {"accuracy": "exact"}})["summary"]
+        check(summary["finite"]["steps"] == 1 and summary["finite"]["qps"] < 10, far, down, summary["finite"])
+        check(summary["outcome"] == "converged" or far > 0 or down < 0.01, far, down, summary)
+        check(summary["outcome"] in ("converged", "precision_limit"), far, down, summary)
+        check(("move it" in summary["message"]) == (summary["outcome"] == "precision_limit" and far > 0), far, summary["message"])
+        return summary["energy"]["strain"]
+    for down in (0.1, 0.01, 0.001):
+        here = energy(0, down)
+        for far in (30, 300, 1e5):
+            check(abs(energy(far, down) - here) < 2e-7 * here, far, down)
+
+
 def bricks(aside, down, **problem):
     """A brick on a longer one, pressed into it and moved along it."""
     lower, upper = brick("hex8", (6, 2, 2), 0, lambda x, y, z: (3 * x, y, 1.2 * z)), brick("hex8", (3, 2, 2), 63, lambda x, y, z: (0.4 + x, 1 + 0.7 * y, 0.1 + z))

@@ -342,7 +342,7 @@ def words(scene, rng):
     if solid:
         M = quarter(dim, rng)
         yield Word("by a quarter", mapped(request, M), M)
-        yield Word("moved", mapped(request, unit(dim), shift=[rng.uniform(-30, 30) for _ in range(dim)]), unit(dim))
+        yield Word("moved", mapped(request, unit(dim), shift=[rng.uniform(-1, 1) * rng.choice((30, 3000)) for _ in range(dim)]), unit(dim))
         rigid = [s for s in request["problem"]["supports"] if "rigid" in s]
         if not any("spring" in s for s in request["problem"]["supports"]) and not scene.stabilized and \
                 not any(key in s["rigid"] for s in rigid for key in AXES + ("rx", "ry", "rz")):
