@@ -250,7 +250,7 @@ static bool may_be_nonlinear(const doubts *d, double buckling, double leverage)
     const double most = sqrt(stiffest * size * size * depth);
     const double least = 0.25 * fmin(UZ_SURELY_SMALL, leverage > 0 ? UZ_SURELY_HELD / (leverage * most) : INFINITY);
     const double steep = 0.25 * fmin(UZ_SURELY_SMALL * buckling, fmin(least, sqrt(2 * least * sqrt(2 * U) / most)));
-    return U > 0 && (around > steep || is_steep(d, steep));
+    return around > steep || is_steep(d, steep); /* where U is 0, of whatever is not flat: warmth may have done it */
 }
 
 /* Small deformation takes a turn for a x r, which stretches what turns by a^2 / 2. */

@@ -137,6 +137,13 @@ def test_a_warm_body_is_a_larger_one(s):
     # and auto sees that it is no small deformation
     _, auto = answer(s, warm_block("plane_strain", "neo_hooke", temperature=250, kinematics="auto"), "summary,stress")
     check(auto["summary"]["small_deformation"]["error"] > 0.05 and abs(auto["stress"][0][1] - flat["stress"][0][1]) < 1e-8, auto["summary"])
+    # also where nothing holds it but across the plane, and displacements have no energy to be compared with
+    loose = block("neo_hooke", model="plane_strain", kinematics="auto", contacts=[], supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}],
+                  materials=[{"on": "all", "young": 1, "poisson": 0.3, "law": "neo_hooke", "expansion": 1e-3}], loads=[{"on": "all", "temperature": 60}])
+    for temperature, told in ((200, True), (20, False)):
+        loose["problem"]["loads"][0]["temperature"] = temperature
+        _, auto = answer(s, loose, "summary")
+        check(("finite" in auto["summary"]) == told and auto["summary"]["small_deformation"]["error"] > 0.01, temperature, auto["summary"])
     # each point of a path has its part of the temperature
     path = {**warm_block("plane_stress", "neo_hooke"), "cases": [{"name": "warm", "steps": [0.5, 1], "loads": [{"on": "all", "temperature": 250}]}]}
     name, _ = answer(s, path, "summary")
