@@ -179,9 +179,10 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
             uz_table_abandon(cache, item);
     } else {
         factor = ((kept_factor *)uz_item_object(item))->factor;
-        uz_factor_info there = uz_factor_describe(factor);
-        there.condensing = uz_factor_condensing(factor, dofs, n_dofs, rows);
-        status = there.condensing < 0.0 ? uz_no_memory(err, "what a contact reaches") : accept(ctx, &there, err);
+        uz_factor_info there;
+        status = uz_factor_describe_for(&there, factor, dofs, n_dofs, rows, err);
+        if (status == UZ_OK)
+            status = accept(ctx, &there, err);
         out->analysis_reused = out->factor_reused = status == UZ_OK;
         if (status != UZ_OK)
             uz_table_release(cache, item);

@@ -216,8 +216,11 @@ bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n
     return found == n;
 }
 
-double uz_factor_condensing(const uz_factor *factor, const int64_t *dofs, int64_t n_dofs, int64_t rows)
+uz_status uz_factor_describe_for(uz_factor_info *out, const uz_factor *factor, const int64_t *dofs, int64_t n_dofs,
+                                 int64_t rows, uz_error *err)
 {
     const bool last = uz_factor_ends_with(factor, dofs, n_dofs);
-    return uz_condensing_flops(&factor->L, last, dofs, n_dofs, last || rows > 0 ? rows : n_dofs);
+    *out = factor->info;
+    out->condensing = uz_condensing_flops(&factor->L, last, dofs, n_dofs, last || rows > 0 ? rows : n_dofs);
+    return out->condensing < 0.0 ? uz_no_memory(err, "what a contact reaches") : UZ_OK;
 }

@@ -36,7 +36,7 @@ typedef struct {
     double inverse_bound;
     double order_s; /* what the analysis took, whoever waited for it */
     double factor_s;
-    double condensing; /* flops to condense contact that it was not made for; who asks for it fills it in */
+    double condensing; /* flops to condense contact: uz_factor_describe_for */
     /* The analysis's own: where dof i stands in the factor's order (n), and the n_last dofs, ascending, that come last:
      * 0 where none has to. */
     const int64_t *position, *last;
@@ -80,9 +80,10 @@ uz_factor_info uz_factor_describe(const uz_factor *factor);
 uz_analysis *uz_factor_analysis(const uz_factor *factor);
 /* Are the n dofs (ascending) among those that come last? Always where n = 0. */
 bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n);
-/* Additions and multiplications that condensing takes, as uz_analysis_create counts them, with the same dofs and rows;
- * below 0: no memory. */
-double uz_factor_condensing(const uz_factor *factor, const int64_t *dofs, int64_t n_dofs, int64_t rows);
+/* With the additions and multiplications that condensing rows on these dofs takes, as uz_analysis_create counts them
+ * with the same numbers. UZ_ERR_MEMORY. */
+uz_status uz_factor_describe_for(uz_factor_info *out, const uz_factor *factor, const int64_t *dofs, int64_t n_dofs,
+                                 int64_t rows, uz_error *err);
 
 uz_factor_workspace *uz_factor_workspace_new(void); /* NULL: no memory */
 void uz_factor_workspace_free(uz_factor_workspace *ws);

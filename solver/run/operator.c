@@ -289,13 +289,11 @@ uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, co
     setup->factor = base->factor;
     setup->amg = base->amg;
     setup->plan = base->plan;
-    uz_factor_info there = setup->factor ? uz_factor_describe(setup->factor) : (uz_factor_info){0};
+    uz_factor_info there;
     if (status == UZ_OK && setup->factor)
-        there.condensing =
-            uz_factor_condensing(setup->factor, dofs, n_b, uz_cost_is_one_to_one(m.N, n_b) ? 0 : m.N->rows);
+        status = uz_factor_describe_for(&there, setup->factor, dofs, n_b,
+                                        uz_cost_is_one_to_one(m.N, n_b) ? 0 : m.N->rows, err);
     free(dofs);
-    if (there.condensing < 0.0)
-        status = uz_no_memory(err, "what a contact reaches");
     if (status != UZ_OK)
         return status;
     if (!setup->factor)
