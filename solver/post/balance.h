@@ -52,9 +52,10 @@ void uz_doubt_coarse_mesh(uz_evaluation *out, double mesh_error);
 void uz_doubt_unborne(uz_evaluation *out);
 /* *part: about how much of the forces of the answer u small deformation leaves out: squares of its gradient in the
  * strains, by the energy norm; stress that turns with the body, along u; strains and rotations in the law itself,
- * weighted by the energy (U, > 0). Relative to its energy norm; and what the mean stress does to a strip that bends,
- * see nonlinear.c (buckling: uz_least_buckling_strain), or to forces (leverage: uz_force_leverage). NaN: elements have
- * incompatible modes, which large deformation has not. UZ_ERR_MEMORY. */
+ * weighted by the energy U. Relative to its energy norm, and 1 where U is 0, as of warmth that nothing holds; and what
+ * the mean stress does to a strip that bends, see nonlinear.c (buckling: uz_least_buckling_strain), or to forces
+ * (leverage: uz_force_leverage). NaN: elements have incompatible modes, which large deformation has not. UZ_ERR_MEMORY.
+ */
 uz_status uz_measure_nonlinear(double *part, const uz_body_model *model, const double *u, double energy,
                                double buckling, double leverage, uz_error *err);
 /* *out: sqrt(2 U S) / F over the root of the body's stiffness integral E dV, see leverage.c: the error of a force, in

@@ -314,11 +314,11 @@ uz_status uz_measure_nonlinear(double *out, const uz_body_model *model, const do
     *out = NAN;
     if (status != UZ_OK || all.other)
         return status;
-    const double part = mean_strain(&all) / buckling, gradient = total(&all.gradient);
-    const double aside = gradient > 0 ? sqrt(total(&all.turns) / gradient) : 0;
     *out = 1;
     if (!(energy > 0)) /* all of it is more than there is */
         return UZ_OK;
+    const double part = mean_strain(&all) / buckling, gradient = total(&all.gradient);
+    const double aside = gradient > 0 ? sqrt(total(&all.turns) / gradient) : 0;
     const double left = (sqrt(total(&all.squares)) + sqrt(total(&all.law))) / sqrt(2 * energy);
     const double forces = left * leverage * sqrt(total(&all.modulus));
     *out = fmax(fmax(part * fmax(2 * UZ_SURELY_SMALL, aside), forces * (UZ_SURELY_SMALL / UZ_SURELY_HELD)),

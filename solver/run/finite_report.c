@@ -18,10 +18,10 @@
 /* An obstacle that stands deeper in a side between rows than this part of its length, or presses it from farther away:
  * rows leave 0.01 at most. */
 #define CUTS_IN 0.03
-/* A body that stands so much farther from where coordinates begin than it is large gains digits there. */
-#define FAR 3
 /* And one that no side of the contact comes so near to. */
 #define TOUCHES 1e-6
+/* A body that stands so much farther from where coordinates begin than it is large gains digits there. */
+#define FAR 3
 /* Forces that are less than this part of those by which the strain energy comes from the largest displacement are what
  * equations leave, as of warmth, which holds itself. */
 #define LEAST_OF_ENERGY 1e-6

@@ -22,6 +22,13 @@ static const uz_cost_size BODY = {.d = 100000,
                                   .bounds = true,
                                   .cases = 1};
 
+static uz_cost_size body_under(int64_t rows)
+{
+    uz_cost_size size = BODY;
+    size.m = size.n_b = size.n_entries = rows;
+    return size;
+}
+
 /* A solid of hex8 under few rows. */
 static bool is_surely_free(uz_cost_plan *plan, int64_t nx, int64_t ny, int64_t nz, uz_operator asked, size_t limit)
 {
@@ -329,15 +336,7 @@ TEST(tetrahedra_of_no_grid_are_irregular)
 /* An order that was made to know the price has been paid for, whatever is chosen. */
 TEST(an_order_that_is_there_makes_no_form_dearer)
 {
-    const uz_cost_size size = {.d = 100000,
-                               .m = 100,
-                               .n_b = 100,
-                               .k_entries = 4100000,
-                               .n_entries = 100,
-                               .modes = 6,
-                               .active_set = true,
-                               .bounds = true,
-                               .cases = 1};
+    const uz_cost_size size = body_under(100);
     for (int large = 0; large < 2; large++) {
         uz_factor_info factor = {.nnz = large ? 400000000 : 4000000, .flops = large ? 1e12 : 1e9, .bytes = 32000000};
         uz_cost_plan quick, slow;
@@ -354,15 +353,7 @@ TEST(an_order_that_is_there_makes_no_form_dearer)
 /* It is chosen, where it would not be made, and of it only the contact that it was not made for is paid. */
 TEST(a_factor_that_is_there_is_not_paid_again)
 {
-    const uz_cost_size size = {.d = 100000,
-                               .m = 100,
-                               .n_b = 100,
-                               .k_entries = 4100000,
-                               .n_entries = 100,
-                               .modes = 6,
-                               .active_set = true,
-                               .bounds = true,
-                               .cases = 1};
+    const uz_cost_size size = body_under(100);
     uz_factor_info factor = {.nnz = 400000000, .flops = 1e12, .bytes = 32000000, .order_s = 1000.0};
     uz_cost_plan made, there, condensed;
     uz_cost_decide(&made, &size, &factor, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_AUTO, 0);
